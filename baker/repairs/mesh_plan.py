@@ -25,7 +25,7 @@ _FLOAT_NORMAL = 12
 
 @dataclass(frozen=True)
 class Change:
-    """The change of one kind that was made to a mesh.
+    """A change that was made to a mesh, such as the removal of duplicate faces.
 
     Attributes
     ----------

@@ -120,8 +120,8 @@ def largest_distance(
 ) -> float:
     """Return the largest distance from points on one surface to another surface.
 
-    This is the one-sided Hausdorff distance, measured at all vertices of the sampled faces and at about 20
-    000 points on regular grids in these faces.
+    This is the one-sided Hausdorff distance. It is measured at all vertices of the sampled faces and at
+    points of regular grids on these faces, about `_DISTANCE_SAMPLES` points in total.
 
     Parameters
     ----------

@@ -156,7 +156,7 @@ class _Edges:
 def _orient(
     edge: _Edges, n: int, closed_face: NDArray[np.bool_]
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return two masks of faces, (n,): wound like the first face of the piece, and of one-sided pieces.
+    """Return two masks (n,): faces wound like the first face of their piece, faces of one-sided pieces.
 
     A graph has two nodes for each face: node f is the face as it is, and node f + n the flipped face. The
     edges of the graph depend on the half edges of two neighbouring faces f and g. If they run in opposite
