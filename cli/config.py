@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from baker.cli.flags import in_keys
 from baker.core.errors import SettingsError
 from baker.core.names import unknown_name
 from baker.core.settings_model import Settings
+from baker.io.regular_file import LARGEST_TEXT, read_regular
 
 # The table whose keys may also be at the top level of the file.
 TOP_TABLE = "bake"
@@ -75,8 +77,10 @@ def _top_keys() -> Collection[str]:
 def _read_toml(path: Path) -> dict[str, Any]:
     import tomllib
 
+    if str(path) == os.devnull:
+        return {}  # by convention, a file without settings
     try:
-        return tomllib.loads(path.read_text("utf-8"))
+        return tomllib.loads(read_regular(path, most=LARGEST_TEXT).decode("utf-8-sig"))
     except OSError as error:
         raise SettingsError(f"the configuration cannot be read: {error.strerror}", file=str(path)) from None
     except UnicodeDecodeError:

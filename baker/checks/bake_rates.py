@@ -15,6 +15,7 @@ from typing import Any
 from baker.core.errors import SettingsError
 from baker.core.stage import Stage
 from baker.io.bake.output_folder import MANIFEST_NAME
+from baker.io.regular_file import read_regular
 
 # Number of entries of the scene's folder that are searched for `bake.json`.
 # Size above which a manifest is not read, bytes.
@@ -84,7 +85,7 @@ def rates_of(folder: Path) -> Rates:
         If the folder has no bake, or the manifest lacks the numbers of rays or the timings.
     """
     try:
-        return rates_of_bake(json.loads((folder / MANIFEST_NAME).read_text("utf-8")))
+        return rates_of_bake(json.loads(read_regular(folder / MANIFEST_NAME, most=_MOST_BYTES)))
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         why = f"the folder holds no bake whose {MANIFEST_NAME} tells its rays and timings; name another one"
         raise SettingsError(why, file=str(folder), object="rates") from None
@@ -102,9 +103,7 @@ def rates_beside(scene: Path) -> Rates | None:
             path = folder / MANIFEST_NAME
             # Skip unreadable manifests: the user did not name these folders.
             with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
-                if path.stat().st_size > _MOST_BYTES:
-                    continue
-                manifest: dict[str, Any] = json.loads(path.read_text("utf-8"))
+                manifest: dict[str, Any] = json.loads(read_regular(path, most=_MOST_BYTES))
                 if (folder / manifest["input"]["path"]).resolve() == scene.resolve():
                     found.append((str(manifest["created"]), folder.name, rates_of_bake(manifest)))
     if not found:

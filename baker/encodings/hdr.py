@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels, write_image
 from baker.core.errors import InputError
+from baker.io.regular_file import read_regular
 
 # Largest value: the largest mantissa, 255, with the largest stored exponent, 255.
 HDR_MAX = 255.0 * 2.0 ** (255 - 136)
@@ -83,7 +84,7 @@ class HdrEncoding(Encoding[EncodingOptions]):
             If the file is missing, damaged or not Radiance RGBE.
         """
         try:
-            data = path.read_bytes()
+            data = read_regular(path)
         except OSError as error:
             raise InputError(f"the image cannot be read ({error.strerror})", file=str(path)) from None
         try:

@@ -18,6 +18,7 @@ from baker.io.bake.read_manifest import read_manifest
 from baker.io.bake.recovery import recover
 from baker.io.output_path import not_text
 from baker.io.png import decode_palette_png
+from baker.io.regular_file import read_regular
 
 
 def inspect_path(path: Path | str, *, allow_outside: bool = False) -> dict[str, Any]:
@@ -49,6 +50,8 @@ def inspect_path(path: Path | str, *, allow_outside: bool = False) -> dict[str, 
         raise InputError("there is no such file or folder", file=str(path))
     if path.is_dir():
         return _bake(path)
+    if not path.is_file():
+        raise InputError("it is a device, a pipe or a socket, not a regular file", file=str(path))
     if path.suffix.lower() == ".png" and (found := _status(path)) is not None:
         return found
     encoding = encoding_of(path.name)
@@ -91,7 +94,7 @@ def _bake(folder: Path) -> dict[str, Any]:
 def _status(path: Path) -> dict[str, Any] | None:
     """Count the texels of each status in a file such as `status_0.png`; return None for any other PNG."""
     try:
-        data = path.read_bytes()
+        data = read_regular(path)
         # Recognise the file by the text chunk `Legend`, which only status images have.
         if b"tEXtLegend\x00" not in data:
             return None

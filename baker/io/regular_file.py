@@ -7,8 +7,10 @@ import os
 import stat
 from pathlib import Path
 
-# Size above which a scene, buffer or image file is not read, bytes. The length in a GLB header has 32 bits.
+# Size above which a scene or buffer file is not read, bytes. The length in a GLB header has 32 bits.
 LARGEST = 1 << 32
+# Size above which an image or a material library is not read, bytes.
+LARGEST_PART = 1 << 30
 # Size above which a text file with settings or jobs is not read, bytes.
 LARGEST_TEXT = 1 << 24
 _LFS = b"version https://git-lfs.github.com/spec/"
@@ -21,7 +23,7 @@ _KINDS = (
 )
 
 
-def read_regular(path: Path | str, *, most: int = LARGEST) -> bytes:
+def read_regular(path: Path | str, *, most: int = LARGEST, first: int | None = None) -> bytes:
     """Return the content of a regular file.
 
     Parameters
@@ -30,6 +32,8 @@ def read_regular(path: Path | str, *, most: int = LARGEST) -> bytes:
         The file, or a symbolic link to it.
     most : int
         Largest accepted size, bytes; a larger file is refused before it is read.
+    first : int, optional
+        Read only the first bytes, at most this number; `most` then limits what is read.
 
     Returns
     -------
@@ -51,14 +55,14 @@ def read_regular(path: Path | str, *, most: int = LARGEST) -> bytes:
     with os.fdopen(file, "rb") as stream:
         found = os.fstat(stream.fileno())
         _check(path, found.st_mode)
-        if found.st_size > most:
-            why = f"it has {found.st_size} bytes; at most {most} are read"
-            raise OSError(errno.EFBIG, why, str(path))
-        # Files in /proc report size 0, although they have content.
-        data = stream.read(most + 1) if found.st_size == 0 else stream.read(found.st_size)
+        # Read enough to recognise a pointer, whatever `first` is.
+        size = found.st_size if first is None else min(found.st_size, max(first, len(_LFS)))
+        if size > most:
+            raise OSError(errno.EFBIG, f"it has {size} bytes; at most {most} are read", str(path))
+        data = stream.read(size)
     if data.startswith(_LFS):
         raise OSError(errno.EINVAL, "it is a Git LFS pointer; run `git lfs pull`", str(path))
-    return data
+    return data if first is None else data[:first]
 
 
 def _check(path: Path, mode: int) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from baker.core.errors import InputError
-from baker.io.regular_file import LARGEST, read_regular
+from baker.io.regular_file import LARGEST, LARGEST_PART, read_regular
 
 
 class OutsideError(InputError):
@@ -40,7 +40,7 @@ class SceneFolder:
     allow_outside: bool = False
     self_contained: bool = False
 
-    def read(self, name: str, *, base: Path | None = None, most: int = LARGEST) -> bytes:
+    def read(self, name: str, *, base: Path | None = None, first: int | None = None) -> bytes:
         """Return the content of a file that the scene refers to.
 
         Parameters
@@ -49,8 +49,8 @@ class SceneFolder:
             Path of the file, relative to `base`.
         base : Path, optional
             Folder of the file that contains the name; by default the folder of the scene.
-        most : int
-            Largest accepted size, bytes.
+        first : int, optional
+            Read only the first bytes, at most this number.
 
         Returns
         -------
@@ -63,18 +63,19 @@ class SceneFolder:
             If the file, after resolving symbolic links, is not inside the folder of the scene. The error is
             the same whether the file exists or not.
         OSError
-            If the file is missing, unreadable, not a regular file, longer than `most`, or a Git LFS pointer.
+            If the file is missing, unreadable, not a regular file, too long, or a Git LFS pointer.
         ValueError
             If no file can have this name.
         """
+        most = LARGEST_PART if first is None else LARGEST
         path = (self.path if base is None else base) / name
         if self.self_contained:
             raise OSError(0, "the scene of a bake holds all its data, so no other file is read", str(path))
         if self.allow_outside:
-            return read_regular(path, most=most)
+            return read_regular(path, most=most, first=first)
         real = Path(os.path.realpath(path))
         if not real.is_relative_to(os.path.realpath(self.path)):
             raise OutsideName(
                 "is outside of the scene's folder; move it into the folder, or pass `allow_outside=True`"
             )
-        return read_regular(real, most=most)
+        return read_regular(real, most=most, first=first)

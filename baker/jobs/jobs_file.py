@@ -18,6 +18,7 @@ from baker.core.errors import InputError, SettingsError
 from baker.core.names import unknown_name
 from baker.core.settings import BakeSettings, make_settings
 from baker.io.bake.output_folder import own_files
+from baker.io.regular_file import LARGEST_TEXT, read_regular
 
 _TABLES = ("defaults", "job")
 _WILD = re.compile(r"[*?\[]")
@@ -88,7 +89,7 @@ def _parse(path: Path) -> dict[str, Any]:
     import tomllib
 
     try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        return tomllib.loads(read_regular(path, most=LARGEST_TEXT).decode("utf-8-sig"))
     except OSError as error:
         why = "there is no such file" if isinstance(error, FileNotFoundError) else error.strerror
         raise InputError(f"the list of jobs cannot be read: {why}", file=str(path)) from None

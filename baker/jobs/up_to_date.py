@@ -15,6 +15,7 @@ from typing import Any
 from baker.core.settings import BakeSettings
 from baker.io.bake.manifest import library_versions, resolved_settings
 from baker.io.bake.output_folder import AS_BAKED, MANIFEST_NAME, file_state
+from baker.io.regular_file import read_regular
 
 # Settings in the manifest that are not compared, because values that are compared determine them. `quality`
 # only sets the default of `samples`, and `ao_distance_metres` follows from `ao_distance` and the scene.
@@ -60,7 +61,7 @@ def check_output(out: Path, sha256: str, settings: BakeSettings) -> Freshness:
         The result; not fresh if the manifest is missing or unreadable.
     """
     try:
-        data = (out / MANIFEST_NAME).read_bytes()
+        data = read_regular(out / MANIFEST_NAME)
     except OSError:
         return Freshness(False, "not baked yet")
     try:

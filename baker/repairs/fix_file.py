@@ -21,7 +21,7 @@ from baker.io.gltf.edited_primitive import EditedPrimitive, ReplacedPrimitive
 from baker.io.gltf.primitive_columns import read_columns, why_locked
 from baker.io.gltf.write_fixed import write_fixed
 from baker.io.gltf.write_source import source_glb
-from baker.io.load import IMPORTERS, SceneFile, load_scene
+from baker.io.load import IMPORTERS, SceneFile, load_scene, read_scene_file
 from baker.repairs.inside_out import faces_to_flip
 from baker.repairs.lightmap_uv import UvRequest, new_lightmap_uv
 from baker.repairs.mesh_plan import Change, plan_mesh
@@ -154,7 +154,7 @@ def fix_file(path: Path, settings: RepairSettings | None = None, progress: Progr
         data = source_glb(scene, scene.source_scene)
         scene = read(data)
     elif not _names_files(scene.source):
-        written = path.read_bytes()
+        written = read_scene_file(path)
         data = written if written[:4] == b"glTF" else None
     result = _fix(scene, data, settings, progress, make_normals=not settings.repair)
     if settings.repair:

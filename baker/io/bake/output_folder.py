@@ -21,6 +21,7 @@ from baker.io.bake.mounts import cannot_move
 from baker.io.bake.recovery import MANIFEST_NAME, NEW, exchange_files, lies_inside, recover, undo
 from baker.io.exchange import exchange_paths
 from baker.io.output_path import resolved_output
+from baker.io.regular_file import read_regular
 from baker.io.temporary import TemporaryFolder
 
 __all__ = ["MANIFEST_NAME", "OutputFolder", "check_out", "file_state", "is_file", "own_files"]
@@ -89,7 +90,7 @@ def own_files(folder: Path) -> set[str] | None:
         file outside the folder, by its path or through a symbolic link.
     """
     try:
-        manifest = json.loads((folder / MANIFEST_NAME).read_text("utf-8"))
+        manifest = json.loads(read_regular(folder / MANIFEST_NAME))
         names = {MANIFEST_NAME, *(entry["file"] for entry in manifest["files"])}
         known = isinstance(manifest["versions"]["baker"], str)
         return names if known and all(lies_inside(folder, name) for name in names) else None

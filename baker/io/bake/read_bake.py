@@ -22,6 +22,7 @@ from baker.io.bake.read_manifest import read_manifest
 from baker.io.choose import choose_objects
 from baker.io.load import load_scene
 from baker.io.png import decode_palette_png
+from baker.io.regular_file import read_regular
 
 SCENE_NAME = "scene.glb"
 
@@ -176,7 +177,7 @@ def _layout(folder: Path, scene: Scene, index: int, row: dict[str, Any] | None) 
 def _status(folder: Path, page: int, resolution: int) -> NDArray[np.uint8]:
     path = _present(folder, f"status_{page}.png")
     try:
-        status = decode_palette_png(path.read_bytes())
+        status = decode_palette_png(read_regular(path))
     except (OSError, ValueError):
         raise InputError("the file is not a readable PNG; bake the scene again", file=str(path)) from None
     if status.shape != (resolution, resolution):

@@ -15,6 +15,7 @@ from baker.io.bake.manifest import manifest_schema
 from baker.io.bake.output_folder import MANIFEST_NAME, own_files
 from baker.io.bake.recovery import recover
 from baker.io.output_path import not_text
+from baker.io.regular_file import read_regular
 
 # Size above which a manifest is not read, bytes.
 _LONGEST = 1 << 30
@@ -54,7 +55,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     if own_files(folder) is None or path.stat().st_size > _LONGEST:
         raise InputError(f"the folder holds no bake: it has no readable {MANIFEST_NAME}", file=str(folder))
     try:
-        manifest: dict[str, Any] = json.loads(path.read_text("utf-8"), parse_constant=_no_number)
+        manifest: dict[str, Any] = json.loads(read_regular(path, most=_LONGEST), parse_constant=_no_number)
         _check_schema(manifest)
         _check_consistency(manifest)
     except (ValueError, OverflowError, RecursionError) as error:

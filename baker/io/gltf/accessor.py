@@ -18,7 +18,7 @@ _WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 FLOAT = 5126
 UNSIGNED = (5121, 5123, 5125)
 # Largest `count` accepted for an accessor without a buffer view, elements.
-_MAX_ZEROS = 1 << 26
+_MAX_ZEROS = 1 << 22
 
 
 def read_accessor(document: GltfDocument, index: int, *, types: tuple[str, ...]) -> NDArray[np.float32]:

@@ -227,7 +227,7 @@ def _read_buffer(
     try:
         length = buffer.integer("byteLength", minimum=1)
         if "uri" in buffer:
-            data = _read_file(buffer, folder, digest)
+            data = _read_file(buffer, folder, digest, length)
         elif chunk is not None:
             data = chunk
         else:
@@ -246,11 +246,13 @@ def _read_buffer(
     return (data if len(data) == length else data[:length]), None
 
 
-def _read_file(holder: JsonObject, folder: SceneFolder, digest: hashlib._Hash) -> bytes:
+def _read_file(
+    holder: JsonObject, folder: SceneFolder, digest: hashlib._Hash, first: int | None = None
+) -> bytes:
     """Return the bytes that `holder`'s "uri" refers to; if they come from a file, add them to `digest`."""
     uri = holder.string("uri")
     try:
-        data = read_uri(uri, folder)
+        data = read_uri(uri, folder, first=first)
     except UriError as error:
         holder.fail(str(error), "uri")
     except OutsideName as error:

@@ -22,11 +22,14 @@ class JsonObject:
         Name of the file, for messages.
     """
 
+    # Files may have a million objects.
+    __slots__ = ("_lists", "_value", "file", "where")
+
     def __init__(self, value: Any, where: str, file: str) -> None:
         self._value = value
         self.where = where
         self.file = file
-        self._lists: dict[str, list[JsonObject]] = {}
+        self._lists: dict[str, list[JsonObject]] | None = None
 
     @property
     def value(self) -> dict[str, Any]:
@@ -96,6 +99,8 @@ class JsonObject:
         value = self.value.get(key, [])
         if not isinstance(value, list):
             self.fail(f"expected a list of integers, found {_show(value)}", key)
+        if all(type(v) is int and 0 <= v < count for v in value):
+            return list(value)
         holder = JsonObject({f"{key}[{i}]": v for i, v in enumerate(value)}, self.where, self.file)
         return [holder.index(name, count, what) for name in holder.value]
 
@@ -134,13 +139,16 @@ class JsonObject:
     def children(self, key: str) -> list[JsonObject]:
         """Return the list of objects under `key` (empty if absent); elements are not checked before use."""
         # Cache the list: importers call this for each of possibly thousands of accessors.
+        if self._lists is None:
+            self._lists = {}
         if key not in self._lists:
             self._lists[key] = list(self._children(key))
         return self._lists[key]
 
     def forget(self, key: str) -> None:
         """Drop the cached list under `key` after a change of the document."""
-        self._lists.pop(key, None)
+        if self._lists is not None:
+            self._lists.pop(key, None)
 
     def _children(self, key: str) -> Iterator[JsonObject]:
         value = self.value.get(key, [])

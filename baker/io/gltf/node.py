@@ -11,8 +11,11 @@ from numpy.typing import NDArray
 
 from baker.io.gltf.json import JsonObject
 
+# Members of a node that change its matrix.
+_MOVING = {"matrix", "rotation", "scale", "translation"}
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, slots=True)
 class Placed:
     """A node of the loaded scene, with its world matrix.
 
@@ -52,24 +55,28 @@ def place_nodes(nodes: Sequence[JsonObject], roots: Sequence[int]) -> list[Place
     """
     placed: list[Placed] = []
     parent: dict[int, int | None] = {}
-    waiting: list[tuple[int, int | None, NDArray[np.float64]]] = [
-        (k, None, np.eye(4)) for k in reversed(roots)
-    ]
+    world = np.eye(4)
+    waiting: list[tuple[int, int | None, NDArray[np.float64]]] = [(k, None, world) for k in reversed(roots)]
     while waiting:
         index, above, outer = waiting.pop()
         if index in parent:
             _refuse_second_parent(nodes, parent, index, above)
         parent[index] = above
-        visibility = nodes[index].extension("KHR_node_visibility")
+        node = nodes[index]
+        visibility = node.extension("KHR_node_visibility") if "extensions" in node else None
         if visibility is not None and not visibility.boolean("visible", True):
             continue
-        with np.errstate(over="ignore", invalid="ignore"):
-            matrix = outer @ local_matrix(nodes[index])
-        if not np.isfinite(matrix).all():
-            nodes[index].fail("the node's place in the world is not finite")
-        placed.append(Placed(index, nodes[index], matrix))
-        children = nodes[index].indices("children", len(nodes), "nodes")
-        waiting += [(k, index, matrix) for k in reversed(children)]
+        matrix = outer
+        # Files may have a million nodes without a transform of their own.
+        if _MOVING & node.value.keys():
+            with np.errstate(over="ignore", invalid="ignore"):
+                matrix = outer @ local_matrix(node)
+            if not np.isfinite(matrix).all():
+                node.fail("the node's place in the world is not finite")
+        placed.append(Placed(index, node, matrix))
+        if "children" in node:
+            children = node.indices("children", len(nodes), "nodes")
+            waiting += [(k, index, matrix) for k in reversed(children)]
     return placed
 
 

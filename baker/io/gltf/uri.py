@@ -25,7 +25,7 @@ def is_data(uri: str) -> bool:
     return uri[:5].lower() == "data:"
 
 
-def read_uri(uri: str, folder: SceneFolder) -> bytes:
+def read_uri(uri: str, folder: SceneFolder, *, first: int | None = None) -> bytes:
     """Return the data of a URI.
 
     Parameters
@@ -35,6 +35,8 @@ def read_uri(uri: str, folder: SceneFolder) -> bytes:
         backslashes are accepted although they are no valid URIs.
     folder : SceneFolder
         Folder that relative names refer to.
+    first : int, optional
+        Read only the first bytes of a file, at most this number.
 
     Returns
     -------
@@ -56,7 +58,7 @@ def read_uri(uri: str, folder: SceneFolder) -> bytes:
     outside: OutsideName | None = None
     for name in file_names(uri):
         try:
-            return folder.read(name)
+            return folder.read(name, first=first)
         except FileNotFoundError:
             continue
         except OutsideName as error:
