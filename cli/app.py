@@ -12,7 +12,8 @@ import os
 import sys
 from typing import Any, TextIO
 
-from baker.cli.supervise import INTERRUPTED, supervise
+from baker.cli.interrupt import INTERRUPTED, report_interrupt
+from baker.cli.supervise import supervise
 
 
 def main() -> None:
@@ -25,12 +26,21 @@ def main() -> None:
         # Escape characters that the encoding of the terminal lacks.
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-    stop, notes = supervise(argv)
+    out = sys.stdout
     try:
-        out = _reserve_stdout() if _asks_json(argv) else sys.stdout
+        stop, notes = supervise(argv)
+        sys.unraisablehook = _without_interrupts
+        if _asks_json(argv):
+            out = _reserve_stdout()
         code = run(argv, out=out, stop=stop, notes=notes)
     except KeyboardInterrupt:
+        report_interrupt(argv)
         code = INTERRUPTED
+    except OSError as error:
+        # The system has no process or descriptor left.
+        from baker.cli.failures import report
+
+        code = report(error, as_json=_asks_json(argv), traceback=_verbosity(argv) >= 2, out=out)
     _leave(code)
 
 
@@ -65,7 +75,10 @@ def run(argv: list[str], *, out: TextIO | None = None, stop: Any = None, notes: 
     except (Exception, KeyboardInterrupt) as error:
         from baker.cli.failures import report
 
-        return report(error, as_json=_asks_json(argv), traceback=_verbosity(argv) >= 2, out=out)
+        # An import that is interrupted may fail with any error.
+        interrupted = stop is not None and stop.requested
+        cause = KeyboardInterrupt() if interrupted else error
+        return report(cause, as_json=_asks_json(argv), traceback=_verbosity(argv) >= 2, out=out)
 
 
 def _dispatch(argv: list[str], session: Any) -> int:
@@ -76,6 +89,12 @@ def _dispatch(argv: list[str], session: Any) -> int:
         # typer converts the interrupt to an exit code. Raise it again, so that message and JSON are written.
         raise KeyboardInterrupt
     return code if isinstance(code, int) else 0
+
+
+def _without_interrupts(unraisable: Any) -> None:
+    # An interrupt inside a callback of the interpreter is printed and lost; the flag still stops the work.
+    if not issubclass(unraisable.exc_type, KeyboardInterrupt):
+        sys.__unraisablehook__(unraisable)
 
 
 def _asks_json(argv: list[str]) -> bool:

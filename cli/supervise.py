@@ -13,13 +13,13 @@ import contextlib
 import os
 import signal
 import sys
-import tempfile
 from types import FrameType
+
+from baker.cli.interrupt import INTERRUPTED
 
 # Time that the child has to stop by itself after a signal, seconds.
 GRACE = 0.6
 # Exit codes.
-INTERRUPTED = 130
 RESOURCE = 4
 
 _STOPPING = ("SIGINT", "SIGTERM", "SIGHUP")
@@ -77,8 +77,7 @@ def supervise(argv: list[str]) -> tuple[StopFlag, int | None]:
     sys.stderr.flush()
     # Use a file instead of a pipe, because the parent reads it only at the end, and a batch may write more
     # than the buffer of a pipe.
-    with tempfile.TemporaryFile() as file:
-        notes = os.dup(file.fileno())
+    notes = _unnamed_file()
     blocked = {getattr(signal, name) for name in (*_STOPPING, "SIGTSTP", "SIGCONT")}
     # Block signals until the handlers of parent and child are installed.
     previous = signal.pthread_sigmask(signal.SIG_BLOCK, blocked)
@@ -95,6 +94,16 @@ def supervise(argv: list[str]) -> tuple[StopFlag, int | None]:
     os._exit(watch.wait())
 
 
+def _unnamed_file() -> int:
+    """Return the descriptor of a file without a name."""
+    if hasattr(os, "memfd_create"):
+        return os.memfd_create("baker")
+    import tempfile
+
+    with tempfile.TemporaryFile() as file:
+        return os.dup(file.fileno())
+
+
 def note_output(notes: int | None, out: str) -> None:
     """Record the state of an output path for the parent process, before a command writes to it."""
     if notes is not None:
@@ -108,13 +117,9 @@ def _settle_child(parent: int) -> None:
     # also kill all processes that the child started.
     os.setpgid(0, 0)
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
-    if sys.platform == "linux":
-        import ctypes
+    from baker.core.parent_death import end_with_parent
 
-        pr_set_pdeathsig = 1
-        ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGTERM)
-    if os.getppid() != parent:
-        os._exit(INTERRUPTED)
+    end_with_parent(parent)
 
 
 class _Watch:

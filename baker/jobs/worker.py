@@ -19,6 +19,7 @@ from typing import Any, TextIO
 
 from baker.core.error_mapping import bug, explain
 from baker.core.errors import BakerError
+from baker.core.parent_death import end_with_parent
 
 # Shortest time between two progress messages, seconds.
 _INTERVAL = 0.1
@@ -30,6 +31,7 @@ def main() -> None:
     """Bake jobs until stdin ends."""
     # Ignore Ctrl-C, which the whole process group receives; the parent stops this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent(os.getppid())
     # Native libraries may print to stdout: redirect descriptor 1 to stderr, and keep a copy for the messages.
     sink = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)

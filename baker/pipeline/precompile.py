@@ -11,6 +11,7 @@ Kernels are imported inside functions, because the process must call `skip_blas`
 from __future__ import annotations
 
 import gc
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -18,6 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from baker.core.parent_death import end_with_parent
 from baker.core.progress import Progress, report
 from baker.core.scene import Instance, Material, Mesh, Scene
 from baker.core.stage import Stage
@@ -234,6 +236,7 @@ if __name__ == "__main__":
     from baker.trace.numba_start import skip_blas
 
     skip_blas()
+    end_with_parent(os.getppid())
     # Disable garbage collection, which takes 5 % of the time: compilation allocates millions of small
     # objects, but few reference cycles.
     gc.disable()

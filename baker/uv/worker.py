@@ -7,6 +7,7 @@ by an npz file of that length.
 from __future__ import annotations
 
 import io
+import os
 import signal
 import sys
 from typing import IO, Any
@@ -14,6 +15,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.parent_death import end_with_parent
 from baker.uv.xatlas_charts import ChartJob, FlatCharts, cut_charts
 
 
@@ -61,6 +63,7 @@ def main() -> None:
     """Process jobs until stdin ends."""
     # Ignore Ctrl-C, which signals the whole process group. The parent process kills this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent(os.getppid())
     source, sink = sys.stdin.buffer, sys.stdout.buffer
     while (message := read_message(source)) is not None:
         charts = cut_charts(ChartJob(**message))

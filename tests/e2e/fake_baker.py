@@ -81,6 +81,6 @@ HOWS = {f.__name__: f for f in (polite, deaf, threads, helper, crash, killed)} |
 if __name__ == "__main__":
     HOW = sys.argv.pop(1)
     sys.modules["baker.pipeline.bake"] = types.SimpleNamespace(bake=bake)
-    from baker.cli.app import main
+    from baker.cli.start import main
 
     main()

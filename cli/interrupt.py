@@ -1,0 +1,27 @@
+"""What an interrupted command writes; needs nothing that would first have to be imported."""
+
+from __future__ import annotations
+
+import os
+
+INTERRUPTED = 130
+
+
+def report_interrupt(argv: list[str]) -> None:
+    """Write the message of an interrupted command, and with `--json` its object.
+
+    Parameters
+    ----------
+    argv : list of str
+        Arguments of the command.
+    """
+    texts = {2: b"baker: interrupted\n"}
+    if "--json" in argv:
+        texts[1] = (
+            b'{"error": {"kind": "cancelled", "message": "interrupted", "file": null, "object": null}}\n'
+        )
+    for descriptor, text in texts.items():
+        try:
+            os.write(descriptor, text)
+        except OSError:
+            continue  # closed, or the reader is gone

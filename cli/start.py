@@ -1,0 +1,42 @@
+"""Where the command `baker` begins: handles Ctrl-C and missing streams before anything else is imported."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+
+from baker.cli.interrupt import INTERRUPTED, report_interrupt
+
+
+def main() -> None:
+    """Run the command line of this process; never returns."""
+    open_missing_streams()
+    from baker.cli.app import main as run_command_line
+
+    run_command_line()
+
+
+def _end(number: int, frame: object) -> None:
+    # Nothing has been started or written yet.
+    report_interrupt(sys.argv[1:])
+    os._exit(INTERRUPTED)
+
+
+# At the import already: the time between it and the call of `main` counts, too.
+signal.signal(signal.SIGINT, _end)
+
+
+def open_missing_streams() -> None:
+    """Open the null device for each standard stream that was closed before this process started.
+
+    Otherwise the next file that is opened would be the stream, and would receive what libraries print.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is not None:
+            continue
+        null = os.open(os.devnull, os.O_RDWR)
+        if null != number:
+            os.dup2(null, number)
+            os.close(null)
+        setattr(sys, name, os.fdopen(number, "r" if number == 0 else "w", encoding="utf-8"))
