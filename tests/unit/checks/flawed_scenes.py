@@ -1,4 +1,4 @@
-"""For every code of `baker check` a smallest scene that fires it, and a twin that differs in that alone."""
+"""For each code of `baker check`: a minimal scene with the flaw, and a similar scene without the flaw."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from gltf_builder import QUAD, QUAD_NORMAL, QUAD_TRIANGLE, GltfBuilder
 from PIL import Image
 
-# Unit cube: corners by bits x, y, z; faces wound outwards.
+# Unit cube. Bits 0, 1 and 2 of a vertex index are its x, y and z. The triangles face outwards.
 CUBE = np.float32([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)])
 CUBE_TRIANGLE = np.int64(
     [
@@ -18,7 +18,7 @@ CUBE_TRIANGLE = np.int64(
         [2, 6, 7], [2, 7, 3], [0, 2, 3], [0, 3, 1], [4, 5, 7], [4, 7, 6],
     ]
 )  # fmt: skip
-# A floor of 4 x 4 m, front up.
+# A floor of 4 x 4 m in the plane y = 0. Its front faces up.
 FLOOR = np.float32([[-2, 0, -2], [-2, 0, 2], [2, 0, 2], [2, 0, -2]])
 GREY = {"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1.0]}}
 SQUARE = np.float32([[0, 0], [1, 0], [1, 1], [0, 1]])
@@ -26,7 +26,7 @@ SQUARE = np.float32([[0, 0], [1, 0], [1, 1], [0, 1]])
 
 @dataclass(frozen=True)
 class Case:
-    """A scene that fires a code, its twin, and settings of the bake it is for."""
+    """A GLB with a flaw, a GLB without the flaw, and the bake settings with which both are checked."""
 
     bad: bytes
     good: bytes
@@ -34,7 +34,11 @@ class Case:
 
 
 def scene(*parts: Any, lights: tuple = (), materials: tuple = (GREY,), extra: Any = None) -> bytes:
-    """Return a GLB of parts: (position, triangle, attributes, node members, material number)."""
+    """Return a GLB with one mesh and node for each part.
+
+    A part is (position, triangle, attributes, node members, material index), of which the last three are
+    optional. `lights` has (light, node members). `extra(builder)` edits the document before it is written.
+    """
     builder = GltfBuilder()
     for material in materials:
         builder.add("materials", material)
@@ -60,25 +64,25 @@ def quad(**attributes: Any) -> tuple:
 
 
 def stacked(height: float) -> bytes:
-    """Return a unit cube that stands in a floor, and a smaller one at a height above the floor."""
+    """Return a GLB of a floor, a unit cube on it, and a cube of side 0.5 whose bottom is at y = `height`."""
     small = 0.5 * CUBE + np.float32([0.25, height, 0.25])
     return scene((CUBE, CUBE_TRIANGLE), (FLOOR, [[0, 1, 2], [0, 2, 3]]), (small, CUBE_TRIANGLE))
 
 
 def with_uv(uv: Any, position: Any = QUAD, triangle: Any = QUAD_TRIANGLE) -> bytes:
-    """Return a scene of one mesh with a TEXCOORD_1."""
+    """Return a GLB of one mesh with `uv` as TEXCOORD_1."""
     normal = np.float32(np.tile([0, 0, 1], (len(position), 1)))
     return scene((position, triangle, {"NORMAL": normal, "TEXCOORD_1": np.float32(uv)}))
 
 
 def two_quads(uv: Any) -> bytes:
-    """Return two unit squares side by side in one mesh, sharing no vertex, with a TEXCOORD_1 of 8 rows."""
+    """Return a GLB of one mesh: two unit squares that share no vertex, with `uv` (8, 2) as TEXCOORD_1."""
     position = np.concatenate([QUAD, QUAD + np.float32([3, 0, 0])])
     return with_uv(uv, position, np.concatenate([QUAD_TRIANGLE, QUAD_TRIANGLE + 4]))
 
 
 def boxes(first: Any, second: Any) -> np.ndarray:
-    """Return the uv of two quads in two boxes (u0, v0, u1, v1)."""
+    """Return uv (8, 2): the corners of two boxes, each given as (u0, v0, u1, v1)."""
     return np.concatenate([np.array(b[:2]) + SQUARE * (np.array(b[2:]) - b[:2]) for b in (first, second)])
 
 
@@ -87,12 +91,12 @@ def point(intensity: float, at: Any = (0, 2, 0), **more: Any) -> tuple:
 
 
 def sun(turn: Any, intensity: float = 1000.0) -> tuple:
-    """Return a sun whose node is turned by a quaternion; without it shines along -Z."""
+    """Return a directional light and its node, which the quaternion `turn` rotates from the direction -Z."""
     return {"type": "directional", "intensity": intensity}, {"rotation": list(turn)}
 
 
 def flattened(depth: float) -> tuple:
-    """Return a sun whose own scale squeezes the axis that it shines along."""
+    """Return a directional light and its node. The node's scale is `depth` along the light's axis."""
     return {"type": "directional", "intensity": 1.0}, {"scale": [1, 1, depth], "rotation": list(DOWN)}
 
 
@@ -110,7 +114,7 @@ def png(colour: int) -> bytes:
 
 
 def named(name: str) -> bytes:
-    """Return a square on a node of that name."""
+    """Return a GLB of a square whose node has the given name."""
 
     def rename(builder: GltfBuilder) -> None:
         builder.json["nodes"][0]["name"] = name
@@ -119,14 +123,14 @@ def named(name: str) -> bytes:
 
 
 def painted(grey: float) -> bytes:
-    """Return a square with vertex colours, black except for one corner of that grey."""
+    """Return a GLB of a square with vertex colours: one vertex has the level `grey`, the others are black."""
     colour = np.zeros((4, 3), np.float32)
     colour[2] = grey
     return scene(quad(COLOR_0=colour))
 
 
 def emissive(colour: int) -> bytes:
-    """Return a floor whose emissive texture has one grey."""
+    """Return a GLB of a floor whose emissive texture has the 8-bit level `colour` everywhere."""
 
     def add(builder: GltfBuilder) -> None:
         texture = builder.image(png(colour))
@@ -147,7 +151,7 @@ def _normal(factor: float) -> tuple:
 
 
 def _grid(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return a flat n x n grid in the xy plane over the unit square."""
+    """Return the vertices and triangles of an n x n grid over the unit square of the xy plane."""
     x, y = np.meshgrid(np.arange(n + 1), np.arange(n + 1))
     corner = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).reshape(-1)
     one = np.stack([corner, corner + 1, corner + n + 2], axis=1)
@@ -157,7 +161,7 @@ def _grid(n: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _box_of(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return a closed unit cube of n x n quads a side."""
+    """Return the vertices and triangles of a closed unit cube with n x n quads per side."""
     place, triangle = _grid(n)
     sides, faces = [], []
     for k, (axis, at) in enumerate((a, b) for a in range(3) for b in (0, 1)):
@@ -168,7 +172,7 @@ def _box_of(n: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _fold() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return a 2 x 2 grid, its triangles, and a uv whose middle vertex is pulled over the border."""
+    """Return vertices, triangles and uv of a 2 x 2 grid. In uv the middle vertex lies outside the border."""
     place, triangle = _grid(2)
     uv = np.float32(place[:, :2] * 0.8 + 0.1)
     uv[4] = (0.95, 0.95)

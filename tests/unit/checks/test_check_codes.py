@@ -1,4 +1,4 @@
-"""Every code fires on its scene and is silent on its twin."""
+"""Each check reports its code for the scene with the flaw, and not for the scene without it."""
 
 from __future__ import annotations
 

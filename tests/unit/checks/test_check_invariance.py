@@ -1,4 +1,4 @@
-"""Moving, re-indexing or splitting a scene does not change what is found in it."""
+"""Moving, re-indexing or splitting a scene does not change the findings of `check`."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from baker.checks.run import check_scene
 from baker.checks.settings import CheckSettings
 from baker.core.settings import BakeSettings
 
-# A mesh with a bit of everything: two boxes stuck together, one inside out, one with a hole, a flipped
-# face, a face without area, a double, a sliver.
+# (position, triangle) of each part: two intersecting cubes, a cube that is inside out, a box with a hole, a
+# grid with a flipped triangle, a sliver, a triangle without area, and a duplicate triangle.
 SLIVER = np.float32([[0, 0, 0], [1, 0, 0], [1, 0.0004, 0]])
 PARTS = [
     (CUBE, CUBE_TRIANGLE),
@@ -26,7 +26,8 @@ PARTS = [
     (GRID[:3] + np.float32([0, -3, 0]), [[0, 1, 1]]),
     (CUBE[:3] + np.float32([0, 0, 4]), [[0, 1, 2], [2, 0, 1]]),
 ]
-# Of one mesh as a whole; a vertex that repeats depends on how a file is written.
+# Codes that are not compared. Their counts depend on how the file divides geometry into meshes and vertices,
+# or they are reported once for the scene.
 UNLIKE = {"cost", "duplicate-vertices", "missing-normals", "no-light", "uv.missing", "no-triangles"}
 
 
@@ -40,7 +41,7 @@ def whole():
 
 
 def counts(tmp_path, meshes, **node):
-    """Return {code: count} of meshes [(position, triangle), ...], each in a node of its own."""
+    """Return {code: count} of the findings in a scene with one node for each (position, triangle)."""
     builder = GltfBuilder()
     builder.add("materials", {"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1]}})
     for position, triangle in meshes:
@@ -71,7 +72,7 @@ def test_rotating_and_moving_the_node(tmp_path, plain):
 
 
 def test_turning_the_vertices_themselves(tmp_path, plain):
-    # An exact quarter turn: rounding could make a sliver of what was none.
+    # Permuting the axes is exact. A rotation with rounding errors could turn other triangles into slivers.
     position, triangle = whole()
     assert counts(tmp_path, [(position[:, [1, 2, 0]], triangle)]) == plain
 
@@ -98,7 +99,7 @@ def test_vertices_and_faces_in_another_order(tmp_path, plain):
 
 
 def test_one_object_for_each_part(tmp_path, plain):
-    # The boxes stuck together stay one object: piercing another object is no self-intersection.
+    # The two intersecting cubes stay one object, because intersections between objects are not reported.
     joined = np.concatenate([PARTS[0][0], PARTS[1][0]]), np.concatenate([CUBE_TRIANGLE, CUBE_TRIANGLE + 8])
     assert counts(tmp_path, [joined, *PARTS[2:]]) == plain
 
@@ -131,6 +132,7 @@ def test_uv_findings_do_not_depend_on_the_order_of_faces(tmp_path):
         percents.add(round(overlap[0].found.percent, 6))
         assert overlap[0].found.pairs
     assert len(percents) == 1
-    # Four squares of 0.4, each shifted by 0.15: each hides a square of 0.25 of the one before.
+    # Four squares of side 0.4 in uv, each shifted by 0.15 in u and v. Each overlaps the square before it in a
+    # square of side 0.25.
     union = 0.16 + 3 * (0.16 - 0.0625)
     assert percents.pop() == pytest.approx(100 * (1 - union / 0.64), abs=0.5)

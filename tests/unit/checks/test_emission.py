@@ -1,4 +1,4 @@
-"""Emissive textures in `check`: means over the visible part of a texture, and the position of its light."""
+"""Emissive textures in `check`: mean radiance over the part that the uv use, and position of the emission."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ UV = QUAD[:, :2].copy()
 
 
 def context(tmp_path, uv, texel=(10, 40), scale=(1.0, 1.0, 1.0)):
-    """A lit texel of 64 x 64 on a unit square, and a floor one metre in front of it."""
+    """Return the context of a scene of two unit squares that face each other at a distance of one metre.
+
+    One square emits. Its emissive texture has 64 x 64 texels, of which one is white and the others black.
+    """
     image = np.zeros((64, 64, 3), np.uint8)
     image[texel] = 255
     stream = io.BytesIO()

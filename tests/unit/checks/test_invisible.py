@@ -1,4 +1,4 @@
-"""Objects that their materials make invisible as a whole, and those of which a part can be seen."""
+"""The code `invisible`: reported for objects with alpha 0 everywhere, not for partly visible objects."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def png(alpha):
 
 
 def cells(*alpha):
-    """Return an image of four columns of 8 texels, each of one alpha."""
+    """Return a PNG of blocks of 8 x 8 texels, side by side, with one value of `alpha` for each block."""
     return png(np.repeat(np.uint8([alpha] * 8), 8, axis=1))
 
 
@@ -43,7 +43,7 @@ def quad(builder, material, *, uv=UV, height=0.0, **attributes):
 
 
 def found(tmp_path, builder):
-    """Return the objects that a bake and a check both name."""
+    """Return the objects reported as `invisible`, after asserting that bake and check report the same."""
     path = write(tmp_path / "a.glb", builder)
     baked = [w for w in bake_warnings(load_scene(path), BakeSettings()) if w.code == "invisible"]
     checked = [
@@ -73,7 +73,7 @@ def vertex(*alpha):
     return {"COLOR_0": np.float32([[1, 1, 1, a] for a in alpha])}
 
 
-CELL = UV * np.float32([0.1, 1]) + np.float32([0.3, 0])  # within the second of four columns
+CELL = UV * np.float32([0.1, 1]) + np.float32([0.3, 0])  # within the second of four blocks
 GONE = {
     "BLEND, factor 0": one("BLEND", 0.0),
     "MASK, factor below the cutoff": one("MASK", 0.49),

@@ -1,4 +1,4 @@
-"""A rule that is registered wrongly fails at once, with a sentence that names it."""
+"""Registering a check with invalid arguments raises a ValueError that names the check."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from baker.checks.rule import CHECKS, check
 
 
 def documented(context):
-    """Nothing at all."""
+    """Return no findings."""
     return ()
 
 

@@ -1,4 +1,4 @@
-"""Points of one surface found on another: the same mesh, another mesh, other objects."""
+"""`match` maps surface points of one scene to a scene with other triangles, objects or transforms."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ CEILING = Quad((0, 0, 3), (0, 2, 0), (4, 0, 0))
 
 
 def plain_atlas(scene):
-    """Lightmap uv that is not used."""
+    """Return an atlas with uv (0, 0) everywhere, for tests that read no lightmap."""
     layouts = []
     for k, instance in enumerate(scene.instances):
         mesh = scene.meshes[instance.mesh]
@@ -62,7 +62,7 @@ def test_the_same_mesh_gives_the_same_triangle_and_weights():
 def test_triangles_in_another_order_and_split_otherwise():
     scene = quad_scene([FLOOR, CEILING])
     a = joined(scene)
-    # The other diagonal, the floor's rows last.
+    # Split the quads along the other diagonal, and put the floor's triangles last.
     b = joined(scene)
     mesh = replace(b.meshes[0], triangle=np.int32([[4, 5, 7], [5, 6, 7], [0, 1, 3], [1, 2, 3]]))
     sides = sides_of(a, replace(b, meshes=(mesh,)))
@@ -136,14 +136,14 @@ def test_a_renamed_node_is_known_by_its_mesh():
 
 
 def test_maps_of_different_layout_read_the_same_where_light_is_linear_in_the_place():
-    """Bilinear reading is exact there: what is left is single precision."""
+    """Bilinear lookup reproduces linear light up to rounding errors of single precision."""
     scene = quad_scene([FLOOR])
     stored, points = [], None
     for size, inset in ((32, 2.0), (57, 5.5)):
         atlas = quad_atlas(scene, size, inset)
         geometry = world_geometry(scene, atlas)
         corner, uv = geometry.position[:, :2].astype(float), geometry.uv.astype(float)
-        # World x and y as a linear function of uv.
+        # `basis` (3, 2) maps (u, v, 1) to world x and y.
         basis = np.linalg.lstsq(np.c_[uv, np.ones(4)], corner, rcond=None)[0]
         row, column = np.mgrid[:size, :size]
         centre = np.stack([(column + 0.5) / size, (row + 0.5) / size, np.ones_like(row)], axis=-1)

@@ -1,4 +1,4 @@
-"""One budget: the check `cost` and the limit on memory estimate alike, within 30 % of what bakes take."""
+"""The check `cost` and the memory limit use the same estimate, which is within 30 % of measured bakes."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ from baker.io.load import load_for_bake
 from baker.jobs.memory import estimate_peak
 
 ROOT = Path(__file__).parents[3]
-# Bakes a scene and prints its largest resident memory, rays and pages. `VmHWM` belongs to this process alone;
-# `ru_maxrss` counts the memory of the process that started it as well.
+# Script that bakes a scene and prints its peak resident memory in bytes, and its rays, pages and texels.
+# `VmHWM` is the peak of this process only. `ru_maxrss` also covers the process that started this one.
 BAKE = """
 import json, re, resource, sys
 from baker.core.settings import make_settings
@@ -58,7 +58,7 @@ def test_the_estimate_is_within_30_percent_of_the_measured_peak(name, values):
     command = [sys.executable, "-c", BAKE, str(path), json.dumps(values)]
     settings = make_settings(values)
     estimate = estimate_peak(path, settings)
-    # A run that compiles kernels takes more; the second one has them.
+    # Compiling kernels takes memory. If the first run compiles them, the second loads them from the cache.
     for _ in range(2):
         done = subprocess.run(command, capture_output=True, text=True, timeout=300)
         assert done.returncode == 0, done.stderr
@@ -68,11 +68,11 @@ def test_the_estimate_is_within_30_percent_of_the_measured_peak(name, values):
     assert estimate == pytest.approx(measured["peak"], rel=0.3)
 
     cost = estimate_cost(CheckContext(load_for_bake(path, settings), settings))
-    # The check leaves degenerate triangles out.
+    # The numbers differ slightly, because the check leaves out degenerate triangles.
     assert cost.bytes == pytest.approx(estimate, rel=0.01)
     assert cost.pages == measured["pages"]
     assert 0.3 < measured["texels"] / cost.texels < 1.1
-    # Not estimated: the few rays that find texels with two sides and narrow gaps.
+    # The few rays that detect texels with two sides and narrow gaps are not estimated.
     assert set(cost.rays) == set(measured["rays"]) - {"texel sides", "narrow gaps"}
 
 
@@ -125,7 +125,7 @@ def test_the_estimate_covers_the_decoding_of_a_large_image():
     half = LARGEST_IMAGE_SIDE // 2
     assert image_bytes(scene()) == (0, 0)
     assert image_bytes(scene(64, half)) == (4 * (64**2 + half**2), 4 * (64**2 + 2 * half**2))
-    # It may have been reduced from twice its size.
+    # An image of this size may have been reduced from one of twice its width and height.
     assert image_bytes(scene(half + 1)) == (4 * (half + 1) ** 2, 5 * 4 * (half + 1) ** 2)
     twice = replace(scene(64), materials=scene(64).materials * 2)
     assert image_bytes(twice)[0] == 4 * 64**2

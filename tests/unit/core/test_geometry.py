@@ -1,4 +1,4 @@
-"""Instances in the world: winding, normals and areas under mirrors and uneven scales."""
+"""World geometry of instances: winding, normals and areas under mirroring and non-uniform scale."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from baker.core.texels import TexelBuffer
 
 
 def ball(n=400, seed=0):
-    """A convex mesh with smooth normals, faces outwards."""
+    """Return a convex mesh of n random vertices on the unit sphere, with smooth normals and outward faces."""
     from scipy.spatial import ConvexHull
 
     point = np.random.default_rng(seed).normal(size=(n, 3))
@@ -79,7 +79,8 @@ def test_fronts_stay_outside(scale):
     centre = world.position[world.triangle].mean(axis=1) - [5, -2, 1]
     outwards = np.einsum("ij,ij->i", world.face_normal, centre)
     assert (outwards > 0).all()
-    # An ellipsoid's normal is the gradient of its equation: inverse-transposed, which uneven scales need.
+    # With M = `linear`, the image of the unit sphere is the ellipsoid |M^-1 p|^2 = 1. Its normal is the
+    # gradient of this equation, M^-T M^-1 p.
     linear = matrix(scale, 0.7)[:3, :3]
     object_point = (world.position - [5, -2, 1]) @ np.linalg.inv(linear).T
     truth = object_point @ np.linalg.inv(linear)
@@ -88,7 +89,7 @@ def test_fronts_stay_outside(scale):
     agree = np.einsum("tca,ta->tc", world.normal[world.triangle], world.face_normal)
     assert (agree.mean(axis=1) > 0).all()
     np.testing.assert_allclose(np.linalg.norm(world.normal, axis=1), 1, atol=1e-6)
-    # The signed volume is that of the mesh times the scales.
+    # The signed volume is the volume of the mesh times the absolute product of the scales.
     a, b, c = world.position[world.triangle].astype(float).transpose(1, 0, 2)
     volume = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
     a, b, c = mesh.position[mesh.triangle].astype(float).transpose(1, 0, 2)
@@ -111,7 +112,7 @@ def test_columns_follow_the_instances():
     np.testing.assert_array_equal(world.page, world.instance)
     np.testing.assert_array_equal(world.chart, world.instance)
     assert world.triangle[:half].max() < 30 <= world.triangle[half:].min()
-    # The mirrored copy has the same areas, triangle by triangle.
+    # Each triangle of the mirrored instance has the area of the same triangle in the other instance.
     np.testing.assert_allclose(world.area[half:], world.area[:half], rtol=1e-5)
     low, high = world.position.min(axis=0), world.position.max(axis=0)
     assert world.diagonal == pytest.approx(np.linalg.norm(high - low))

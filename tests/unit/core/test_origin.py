@@ -1,4 +1,4 @@
-"""The origin of a bake's coordinates: 0 near 0, among the detail elsewhere, never at what is far away."""
+"""`Scene.origin` is 0 for scenes near 0, and otherwise near most objects. Skies and strays do not move it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from baker.core.scene import Instance, PunctualLight
 
 
 def room(at=(0.0, 0.0, 0.0), scale=1.0, quads=()):
-    """Return a room of 2 m with a crate, moved by its nodes, and further quads that stay where they are."""
+    """Return a scene: a room of 2 m with a crate, both moved by node transforms, and `quads`, not moved."""
     inside = box_quads((-1, 0, -1), (1, 2, 1), inward=True)
     crate = box_quads((0.1, 0, 0.1), (0.5, 0.4, 0.5), inward=False)
     scene = quad_scene([*inside, *crate, *quads])

@@ -1,4 +1,4 @@
-"""Tiles on threads: every item once, errors and cancelling come through, nothing goes on behind."""
+"""`run_tiles` processes each item once, passes on errors and cancelling, and leaves no thread running."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_cancel_stops_between_tiles(threads):
 
     with pytest.raises(Cancelled):
         run_tiles(500, 1, work, threads=threads, stage="test", progress=progress)
-    # What had begun ends before the call does; the rest never begins.
+    # Tiles that had started finish before the call returns. The other tiles never start.
     assert sorted(started) == sorted(finished)
     assert len(started) < 60
     time.sleep(0.02)
@@ -83,7 +83,7 @@ def test_cancel_before_the_first_tile():
 
 
 def test_a_long_tile_is_still_cancelled():
-    """The caller's wish is asked for while tiles run, not only when they end."""
+    """`progress` is called while a tile runs, not only when a tile ends."""
     released, asked = threading.Event(), []
 
     def progress(stage, fraction, detail=""):

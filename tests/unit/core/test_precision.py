@@ -1,4 +1,4 @@
-"""Steps of single precision against texels: what is stored far out, what is far from everything else."""
+"""`coarse_objects` reports objects whose float32 positions are coarser than a tenth of a texel."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from baker.core.precision import coarse_objects
 
 
 def floor(at, by="node", size=2.0, scale=1.0):
-    """Return a scene of one floor at x = `at`, moved there by its node or by its vertices."""
+    """Return a scene of one floor at x = `at`, moved by its node's transform or by its vertex positions."""
     scene = quad_scene([Quad((-size / 2, 0, -size / 2), (0, 0, size), (size, 0, 0))])
     if by == "vertices":
         mesh = replace(scene.meshes[0], position=scene.meshes[0].position + np.float32([at, 0, 0]))
@@ -23,7 +23,7 @@ def floor(at, by="node", size=2.0, scale=1.0):
 
 
 def both(one, two):
-    """Return the objects of two scenes of one mesh each in one."""
+    """Return one scene with the objects of two scenes that have one mesh each."""
     second = replace(two.instances[0], node=1, mesh=1, name="second")
     return replace(
         one, meshes=(*one.meshes, *two.meshes), materials=one.materials, instances=(*one.instances, second)
@@ -44,7 +44,7 @@ def test_vertices_far_away_are_named_with_their_step(at, texel, step):
     assert f"{1000 * texel:.3g} mm" in found.text or "1 m" in found.text
     assert "coarser" in found.text
     assert "translation" in found.fix
-    # Ten times the texel would do.
+    # Texels that are 100 times as large are not affected.
     assert coarse_objects(floor(at, "vertices"), np.array([100 * texel])) is None
 
 
@@ -57,7 +57,7 @@ def test_a_node_that_takes_far_vertices_back_does_not_help():
 
 
 def test_a_level_in_millimetres_is_measured_in_metres():
-    # Coordinates of 2000 and a scale of 1/1000: steps of a tenth of a micron.
+    # The vertex coordinates reach 1000 and the scale is 1/1000, so the float32 spacing is 0.06 micrometres.
     assert coarse_objects(floor(0, size=2000.0, scale=1e-3), np.array([0.01])) is None
 
 
@@ -66,7 +66,7 @@ def test_two_objects_far_apart_cannot_both_be_fine():
     assert found.count == 1
     assert "100 km" in found.text
     assert "scenes of their own" in found.fix
-    # A backdrop with large texels may be there.
+    # A distant backdrop with large texels is not reported.
     assert coarse_objects(both(floor(0), floor(1e5, size=1e4)), np.array([0.05, 5.0])) is None
 
 

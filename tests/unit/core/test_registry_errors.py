@@ -1,4 +1,4 @@
-"""Registers of plugins, and the words of errors."""
+"""Plugin registries, and the messages of errors."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from baker.core.registry import Registry
 
 @pytest.fixture
 def plugins(tmp_path, monkeypatch):
-    """A package of two plugins and a file that registers nothing."""
+    """Make a package `some_plugins` importable: the plugins `alpha` and `zeta`, and their registry."""
     folder = tmp_path / "some_plugins"
     folder.mkdir()
     (folder / "__init__.py").write_text("")

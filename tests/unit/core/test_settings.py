@@ -1,4 +1,4 @@
-"""Settings: what is refused, in which words, and what the special values mean."""
+"""Bake settings: refused values, error messages, and values with a special meaning such as `inf` or `10%`."""
 
 from __future__ import annotations
 

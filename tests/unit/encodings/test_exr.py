@@ -38,8 +38,8 @@ def test_what_is_written_is_read_back_to_the_last_bit(
 
 
 def test_layout_is_the_one_every_engine_reads(tmp_path: Path) -> None:
-    """Parse the file by hand: version flags, ZIP, increasing lines, and the first block's numbers."""
-    # Smooth, because a block that does not shrink is stored as it is.
+    """Parse the file by hand: version, attributes, order of lines, and the pixels of the first block."""
+    # The pixels are smooth, because EXR stores a block uncompressed if compression does not make it smaller.
     pixels = np.linspace(0, 4, 20 * 8 * 3, dtype=np.float32).reshape(20, 8, 3).round(1)
     encode_exr(tmp_path / "a.exr", pixels, half=True, header={})
     data = (tmp_path / "a.exr").read_bytes()
@@ -61,7 +61,7 @@ def test_layout_is_the_one_every_engine_reads(tmp_path: Path) -> None:
     (offset,) = struct.unpack_from("<Q", data, at)
     line, size = struct.unpack_from("<II", data, offset)
     assert line == 0
-    # EXR's ZIP: deflate, then undo the byte differences, then the split in two halves.
+    # Undo EXR's ZIP compression: inflate, sum the differences of bytes, and interleave the two halves.
     raw = np.frombuffer(zlib.decompress(data[offset + 8 : offset + 8 + size]), np.uint8).astype(np.int64)
     raw = np.cumsum(np.concatenate([raw[:1], raw[1:] - 128])).astype(np.uint8)
     middle = (len(raw) + 1) // 2

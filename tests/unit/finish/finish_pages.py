@@ -1,4 +1,4 @@
-"""Synthetic pages with known light: polygons on a page, area means of an analytic field, slow twins."""
+"""Synthetic pages of polygonal charts with analytic light, and slow reference functions for page kernels."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from scipy.ndimage import distance_transform_edt
 Field = Callable[[int, NDArray, NDArray], NDArray]
 
 SIZE = 128
-# Convex, counter-clockwise in (column, row); slanted borders, a thin chart, one aligned with the grid.
+# One convex polygon per chart, as (column, row) in texels, with positive signed area. The third polygon is
+# aligned with the grid, and the fourth is thin.
 POLYGONS = [
     np.array([[6.3, 10.1], [52.7, 4.6], [58.2, 50.9], [12.4, 56.3]]),
     np.array([[70.2, 8.4], [120.6, 22.3], [81.5, 58.8]]),
@@ -23,7 +24,7 @@ BRIGHTNESS = (1.0, 4.0, 0.25, 2.0, 0.6)
 
 
 def distance_to_edges(polygon: NDArray, x: NDArray, y: NDArray) -> NDArray:
-    """Return the signed distance to the nearest edge, positive inside."""
+    """Return the signed distance of (x, y) to a convex polygon's nearest edge, positive inside, texels."""
     nearest = np.full(np.shape(x), np.inf)
     for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
         edge = (b - a) / np.linalg.norm(b - a)
@@ -32,12 +33,12 @@ def distance_to_edges(polygon: NDArray, x: NDArray, y: NDArray) -> NDArray:
 
 
 def smooth(k: int, x: NDArray, y: NDArray) -> NDArray:
-    """Vary by a half around each chart's own brightness over tens of texels."""
+    """Return light of chart k that varies by 50 % around the chart's brightness over tens of texels."""
     return BRIGHTNESS[k] * (1.0 + 0.5 * np.sin(x / 11.0 + k) * np.cos(y / 13.0 + 2 * k))
 
 
 def contact(k: int, x: NDArray, y: NDArray) -> NDArray:
-    """Darken towards the first edge of each chart as beside a wall, over 6 texels."""
+    """Return `smooth` with a shadow at the first edge of chart k: 80 % darker, decay length 6 texels."""
     a, b = POLYGONS[k][:2]
     edge = (b - a) / np.linalg.norm(b - a)
     distance = np.abs(edge[0] * (y - a[1]) - edge[1] * (x - a[0]))
@@ -45,7 +46,12 @@ def contact(k: int, x: NDArray, y: NDArray) -> NDArray:
 
 
 def make_page(field: Field, n_sub: int = 8) -> tuple[NDArray, NDArray, NDArray]:
-    """Return area means (H, W, 1), charts and centroid offsets of a page, conservatively covered."""
+    """Return (value (H, W, 1), chart (H, W), centroid offset (H, W, 2)) of a page of all charts.
+
+    A value is the mean of `field` over the covered part of the texel, from n_sub x n_sub points. A texel is
+    covered if one of these points is inside the polygon. The offset of the covered part's centroid from the
+    texel centre is in texels.
+    """
     value = np.zeros((SIZE, SIZE, 1))
     chart = np.full((SIZE, SIZE), -1, np.int32)
     offset = np.zeros((SIZE, SIZE, 2))
@@ -69,7 +75,7 @@ def make_page(field: Field, n_sub: int = 8) -> tuple[NDArray, NDArray, NDArray]:
 
 
 def border_error(page: NDArray, field: Field, width: float) -> float:
-    """Return the relative RMS error of bilinear lookups inside charts within `width` texels of a border."""
+    """Return the relative RMS error of bilinear lookups inside charts, within `width` texels of a border."""
     rng = np.random.default_rng(3)
     wrong = []
     for k, polygon in enumerate(POLYGONS):
@@ -83,7 +89,7 @@ def border_error(page: NDArray, field: Field, width: float) -> float:
 
 
 def lookup(page: NDArray, x: NDArray, y: NDArray) -> NDArray:
-    """Read the first channel of a page bilinearly at texel coordinates."""
+    """Return the first channel of a page at texel coordinates (x, y), interpolated bilinearly."""
     column, row = np.floor(x - 0.5).astype(int), np.floor(y - 0.5).astype(int)
     u, v = x - 0.5 - column, y - 0.5 - row
     upper = page[row, column, 0] * (1 - u) + page[row, column + 1, 0] * u
@@ -92,19 +98,22 @@ def lookup(page: NDArray, x: NDArray, y: NDArray) -> NDArray:
 
 
 def squared_distance(mask: NDArray) -> NDArray:
-    """Return the squared distance to the nearest set texel by another library's transform."""
+    """Return the squared distance of each texel to the nearest set texel, computed by SciPy."""
     return np.rint(distance_transform_edt(~mask) ** 2).astype(int)
 
 
 def slow_nearest(mask: NDArray) -> NDArray:
-    """Return the squared distance to the nearest set texel by looking at all of them."""
+    """Return the squared distance of each texel to the nearest set texel, the minimum over all set texels."""
     rows, columns = np.nonzero(mask)
     r, c = np.indices(mask.shape)
     return ((r[..., None] - rows) ** 2 + (c[..., None] - columns) ** 2).min(-1)
 
 
 def slow_plane(value: NDArray, chart: NDArray, covered: NDArray, offset: NDArray, r: int, c: int) -> NDArray:
-    """Return value and slopes at (r, c) of one channel by a dense least-squares solve."""
+    """Return (value, slope along columns, slope along rows) of the plane fit at texel (r, c).
+
+    The normal equations of the weighted least-squares problem are solved by NumPy.
+    """
     rows, columns = np.nonzero(covered & (chart == chart[r, c]))
     near = (abs(rows - r) <= 2) & (abs(columns - c) <= 2)
     rows, columns = rows[near], columns[near]
@@ -119,7 +128,10 @@ def slow_plane(value: NDArray, chart: NDArray, covered: NDArray, offset: NDArray
 
 
 def slow_rings(value: NDArray, chart: NDArray, known: NDArray) -> tuple[NDArray, NDArray]:
-    """Grow known values ring by ring with plain loops; return them and what is known at the end."""
+    """Fill charts from known texels outwards, one ring of neighbours at a time.
+
+    Return the values and the mask of texels that have a value at the end.
+    """
     value, known = value.astype(np.float64), known.copy()
     height, width = chart.shape
     while True:

@@ -36,7 +36,7 @@ def wrong(value, truth, mask):
 
 
 def rings(chart):
-    """Return the two outermost rings of covered texels, and the rest."""
+    """Return two masks of covered texels: those within 2 texels of an empty texel, and the other ones."""
     distance = pages.squared_distance(chart < 0)
     return (chart >= 0) & (distance <= 4), (chart >= 0) & (distance > 4)
 
@@ -53,7 +53,7 @@ def test_noise_falls_inside_and_on_chart_borders(lit, share, inner_gain, border_
     border, inner = rings(chart)
     assert wrong(clean, truth, inner) * inner_gain < wrong(noisy, truth, inner)
     assert wrong(clean, truth, border) * border_gain < wrong(noisy, truth, border)
-    # The outermost ring of an atlas denoised as it lies comes out 10 to 17 % too dark.
+    # If the denoiser sees black between the charts, the outermost ring of texels gets 10 to 17 % too dark.
     assert abs(np.mean(clean[border] / truth[border]) - 1.0) < 0.015 + 0.07 * share
 
 
@@ -70,7 +70,7 @@ def test_a_nearly_converged_page_gets_no_worse(lit):
     for share in (0.005, 0.01):
         noisy = with_noise(truth, share)
         error = (share * truth[..., 1]).astype(np.float32)
-        # Without error bars the curvature of the contact shadow passes for a little noise.
+        # Without a standard error, the noise estimate contains some curvature of the contact shadow.
         for standard_error, most in ((error, 1.05), (None, 1.25)):
             clean = denoise_page(noisy, chart >= 0, chart, standard_error=standard_error)
             for part in rings(chart):
@@ -88,7 +88,7 @@ def test_an_upper_bound_is_lowered_to_the_noise_that_is_seen(lit):
     right, lowered = clean(FITTED * error), clean(6 * error, bound=True)
     covered = chart >= 0
     assert wrong(lowered, right, covered) < 0.1 * wrong(clean(6 * error), right, covered)
-    # What is no loose bound stays, and so does one of zero.
+    # A bound equal to the true error is not lowered. With a bound of zero the page is not filtered.
     assert wrong(clean(error, bound=True), clean(error), covered) < 1e-3
     np.testing.assert_array_equal(clean(0 * error, bound=True), noisy)
 
@@ -124,8 +124,8 @@ def test_surroundings_continue_a_chart_by_its_slope_and_leave_charts_alone():
     expected = ramp(0, x[None, :], x[:, None])
     distance = pages.squared_distance(covered)
     near = (distance > 0) & (distance <= 9)
-    # A plain mirror would be off by twice the slope times the distance, up to 8 %; partly covered texels
-    # hold the value of their centroid, half a texel aside.
+    # Mirroring without the slope would have an error of twice slope times distance, up to 8 %. The tolerance
+    # is for partly covered texels: their value is that of the centroid, up to half a texel from the centre.
     assert np.abs(picture[near, 0] / expected[near] - 1.0).max() < 0.025
     assert picture.min() > 0.0
 
@@ -238,7 +238,7 @@ def test_a_missing_library_is_one_sentence(monkeypatch):
 
 @pytest.mark.parametrize("dim", [1e-3, 1e-6])
 def test_a_dim_chart_is_filtered_as_well_beside_bright_ones(lit, dim):
-    """Whether others are a million times as bright changes little of what is filtered, and how."""
+    """Scaling the light of one chart down by up to 1e6 hardly changes its relative error after filtering."""
     truth, chart = lit
     noisy = with_noise(truth, 0.2)
     error = (0.2 * truth @ np.float32([0.2126, 0.7152, 0.0722])).astype(np.float32)
@@ -252,7 +252,7 @@ def test_a_dim_chart_is_filtered_as_well_beside_bright_ones(lit, dim):
 
 @pytest.mark.parametrize("dim", [1.0, 1e-5])
 def test_what_is_worth_filtering_depends_on_its_own_light(lit, dim):
-    """A noisy chart beside a bright one without noise is filtered, and the bright one stays what it is."""
+    """A noisy chart is filtered even if it is dim. Charts without noise on the same page do not change."""
     truth, chart = lit
     own, others = chart == 0, chart > 0
     scale = np.where(own, dim, 1.0).astype(np.float32)
@@ -263,5 +263,5 @@ def test_what_is_worth_filtering_depends_on_its_own_light(lit, dim):
         page, _ = finish_page(plan, [PageLayer(noisy.astype(np.float32), error)], LIGHT, finisher)
     clean = page / scale[..., None]
     assert wrong(clean, truth, own) < 0.3 * wrong(noisy / scale[..., None], truth, own)
-    # Near the noisy chart's border the window holds no texel of others: they keep their bytes.
+    # Windows contain texels of one chart only, so the charts without noise keep their exact values.
     np.testing.assert_array_equal(page[others], noisy[others].astype(np.float32))

@@ -20,7 +20,7 @@ def test_agrees_with_plain_loops_where_a_chart_hangs_together(seed):
     filled, n_hopeless = fill_invalid(value, chart, valid)
     slow, known = pages.slow_rings(value, chart, valid)
     assert known.sum() > 3 * valid.sum()
-    # Float32 storage of sums in float64: one rounding apart at most.
+    # Both functions sum in float64 and store float32, so values differ by at most one float32 rounding.
     np.testing.assert_allclose(filled[known], slow[known], rtol=3e-7)
     assert n_hopeless == 0
     np.testing.assert_array_equal(filled[valid], value[valid])

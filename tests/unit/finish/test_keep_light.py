@@ -1,4 +1,4 @@
-"""A denoised page keeps the light of its samples, over windows of one chart."""
+"""`keep_light` restores the light that denoising removed, in windows of texels of one chart."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 from baker.finish.finish import ComponentRules, PageLayer, PagePlan, finish_page, open_finisher
 from baker.finish.keep_light import keep_light
 
-# Texels of a whole window, weighted: 64 in each of 5 x 5 blocks, (1/3 + 2/3 + 1 + 2/3 + 1/3)^2 of them.
+# Weighted number of texels of a full window: 5 x 5 blocks of 64 texels. The weights 1/3, 2/3, 1, 2/3, 1/3 of
+# the blocks along each axis sum to 3.
 WINDOW = 64 * 9.0
+# Share of the missing light that is restored in a full window.
 BELIEVED = WINDOW / (WINDOW + 30.0)
 
 
@@ -58,7 +60,7 @@ def test_colours_are_kept_apart() -> None:
 
 
 def test_nothing_crosses_to_another_chart_or_to_texels_that_were_not_chosen() -> None:
-    """Two charts share blocks (the border is at 45); only one lost light."""
+    """Two charts meet at column 45, inside a block. Only the left chart has lost light."""
     noisy, chart = _pages()
     chart[:, 45:] = 1
     chosen = np.ones(chart.shape, bool)
@@ -71,7 +73,10 @@ def test_nothing_crosses_to_another_chart_or_to_texels_that_were_not_chosen() ->
 
 
 def test_few_texels_are_believed_less() -> None:
-    """100 texels in four blocks: around each, one counts whole, two by 2/3 and one by 4/9."""
+    """The chart has 25 texels in each of four blocks.
+
+    In the window around one of these blocks, the four blocks have the weights 1, 2/3, 2/3 and 4/9.
+    """
     noisy, chart = _pages()
     chart[:] = -1
     chart[3:13, 3:13] = 0
@@ -89,10 +94,10 @@ def test_black_pages_stay_black() -> None:
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_rare_bright_samples_are_not_lost(seed: int) -> None:
-    """Texels of 64 samples that find the light with a chance of 0.3 %, falling by e^3 across the page.
+    """Each of the 64 samples of a texel finds the light with a small probability.
 
-    Without the correction 11 to 13 % of the page's light were missing; what is left comes from charts'
-    borders and from the share that is not believed.
+    The probability falls from 0.3 % by a factor of e^3 across the page. Without `keep_light`, 11 to 13 % of
+    the page's light were missing. The tolerance is for chart borders and for the share that is not restored.
     """
     chart = np.zeros((128, 128), np.int32)
     random = np.random.Generator(np.random.PCG64(seed))
@@ -106,7 +111,7 @@ def test_rare_bright_samples_are_not_lost(seed: int) -> None:
 
 
 def test_kept_texels_stay_as_they_were_sampled() -> None:
-    """A dark strip, well known, in bright noise: the filter smears light into it."""
+    """A dark strip with a small standard error lies in bright noise, which a filter would blur into it."""
     chart = np.zeros((64, 64), np.int32)
     random = np.random.Generator(np.random.PCG64(4))
     value = np.abs(random.normal(1.0, 0.3, (64, 64, 1))).astype(np.float32).repeat(3, axis=2)

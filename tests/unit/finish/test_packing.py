@@ -1,4 +1,4 @@
-"""Charts brought together for a filter: each keeps its shape, none touches another, and all come back."""
+"""`pack_charts` moves charts to a smaller page and back. Charts keep their shapes and do not touch."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_charts_keep_their_shape_and_their_distance():
         assert own.sum() == (chart == number).sum()
         r, c = np.nonzero(own)
         assert len(np.unique(rows[own] - r)) == len(np.unique(columns[own] - c)) == 1
-        # No other chart within a few texels.
+        # No other chart lies within 4 texels.
         for down in range(-4, 5):
             for right in range(-4, 5):
                 other = np.roll(small, (down, right), axis=(0, 1))[own]

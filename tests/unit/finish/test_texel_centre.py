@@ -30,7 +30,7 @@ def test_nearest_texel_is_exactly_nearest(density):
 
 @kernel
 def planes_of(value, chart, covered, offset, texel, sums, planes):
-    """Write the planes (n, C, 7) at chosen texels."""
+    """Write the plane fits at the texels with flat indices `texel` (n,) to `planes` (n, C, N_PLANE)."""
     for k in range(len(texel)):
         r, c = texel[k] // value.shape[1], texel[k] % value.shape[1]
         page_slope.fit_plane(value, chart, covered, offset, r, c, 2, 1.0, sums, planes, k)
@@ -56,7 +56,7 @@ def test_each_empty_texel_within_reach_belongs_to_the_nearest_chart():
     chart = np.where(covered, chart, -1).astype(np.int32)
     value = np.where(covered, chart + 1.0, 99.0)[..., None].astype(np.float32)
     grown, dilated = dilate(value, covered, chart, 2)
-    # Charts of one value each stay of one value, whatever lies beside them.
+    # Each chart has one value. Its dilated texels have the same value, whatever the neighbouring charts hold.
     for k in range(5):
         assert (grown[10:30, 8 * k : 8 * k + 6, 0] == k + 1).all()
     assert (grown[~covered & ~dilated] == 0.0).all()
@@ -84,7 +84,7 @@ def test_a_plane_is_reproduced_at_and_beyond_borders():
     covered = chart >= 0
     page, _ = dilate(recentre(value, chart, offset), covered, chart, 2)
     plain, _ = dilate(value, covered, chart, 2)
-    # What is left is the limit on leaving the window's range, on the outermost slivers.
+    # The remaining error is at texels with small coverage, where values are limited to the window's range.
     assert pages.border_error(page, ramp, 0.5) < 0.0005
     assert pages.border_error(page, ramp, 0.5) < 0.1 * pages.border_error(plain, ramp, 0.5)
 
@@ -101,7 +101,7 @@ def test_recentring_brings_border_lookups_nearer_to_the_truth(field, noise):
     if noise == 0.0:
         assert wrong_after < 0.4 * wrong_before
     else:
-        # A slope read off noisy texels may cost a little where there is next to no slope to correct.
+        # With noise, the fitted slope is inaccurate. If the true slope is near zero, the error may increase.
         assert wrong_after < 1.12 * wrong_before
 
 
@@ -134,7 +134,7 @@ def test_recentring_stays_in_bounds_and_leaves_whole_texels_alone():
 
 
 def test_steps_and_faces_are_not_continued_beyond_what_was_measured():
-    """Light that differs from face to face of a chart, and a shadow's edge: no plane, nothing beyond it."""
+    """Values stay within the measured range for light that jumps between faces or at a shadow edge."""
 
     def faces(k, x, y):
         return 1.0 + (np.floor(x / 3.7) + 2 * np.floor(y / 2.9) + k) % 3
@@ -147,7 +147,7 @@ def test_steps_and_faces_are_not_continued_beyond_what_was_measured():
         covered = chart >= 0
         moved = recentre(value, chart, offset)
         page, dilated = dilate(moved, covered, chart, 4)
-        # Before, up to 1.4 times the largest value at borders and 1.7 times in the gaps.
+        # An earlier version reached 1.4 times the largest value at borders and 1.7 times in the padding.
         assert moved[covered].max() <= value[covered].max() * 1.01
         assert page[dilated].max() <= value[covered].max() * 1.01
         assert page[covered | dilated].min() >= 0.0

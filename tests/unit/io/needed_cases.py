@@ -1,4 +1,4 @@
-"""A glTF file with one of everything, and changes that break one thing of it at a time."""
+"""A glTF file with used and unused objects of each kind, and changes that each break one member."""
 
 from __future__ import annotations
 
@@ -16,11 +16,13 @@ UV = QUAD[:, :2].copy()
 
 
 def builder() -> GltfBuilder:
-    """Return a file with one of everything, of which the second ones are not in the scene.
+    """Return a glTF file with used and unused objects of each kind.
 
-    Node 0 shows mesh 0 with material 0; 1 holds the camera, 2 the light, 3 is a joint; 4 shows mesh 1 but is
-    in no scene. Buffer 1 serves the last view, that the last accessor, and nothing names this one. Images 0
-    to 3 are base colour, normal, metallic-roughness, occlusion; texture and image 4 belong to material 1.
+    Used objects: node 0 has mesh 0 with material 0, node 1 has the camera, node 2 has the light, and node 3
+    is a joint. Images 0 to 3 are the base colour, normal, metallic-roughness and occlusion of material 0.
+
+    Unused objects: node 4 is in no scene. Only this node has mesh 1, and only this mesh has material 1 with
+    texture 4 and image 4. The last accessor is unused. Only its view reads buffer 1.
     """
     b = GltfBuilder()
     for _ in range(5):
@@ -86,7 +88,7 @@ SPARE_VIEW = len(DOCUMENT["bufferViews"]) - 1
 
 
 def at(path: str, value: Any) -> Callable[[Document], None]:
-    """Return a change that sets a member named like "nodes.0.mesh"; `...` deletes it."""
+    """Return a change that sets the member at a path such as "nodes.0.mesh". The value `...` deletes it."""
 
     def change(document: Document) -> None:
         holder: Any = document
@@ -102,13 +104,16 @@ def at(path: str, value: Any) -> Callable[[Document], None]:
 
 
 def accessor(name: str, key: str, value: Any, holder: Document | None = None) -> Callable[[Document], None]:
-    """Return a change of the accessor that an attribute of the first primitive names."""
+    """Return a change that sets `key` of the accessor whose index is `holder[name]`.
+
+    By default, `holder` is the attributes of the first primitive.
+    """
     index = (FIRST["attributes"] if holder is None else holder)[name]
     return at(f"accessors.{index}.{key}", value)
 
 
 def both(*changes: Callable[[Document], None]) -> Callable[[Document], None]:
-    """Return several changes as one."""
+    """Return a change that makes several changes one after the other."""
 
     def change(document: Document) -> None:
         for one in changes:
@@ -118,7 +123,7 @@ def both(*changes: Callable[[Document], None]) -> Callable[[Document], None]:
 
 
 def bytes_of(name: str, data: bytes) -> Callable[[Document], bytes]:
-    """Return a change of the bytes at the start of an attribute."""
+    """Return a function that returns the buffer with `data` at the start of an attribute's view."""
 
     def change(document: Document) -> bytes:
         index = FIRST["indices"] if name == "indices" else FIRST["attributes"][name]
@@ -190,7 +195,7 @@ SILENT = {
     "number beyond doubles in extras": at("extras", {"far": float("inf")}),
 }
 
-# Changes that give a warning of this code and do not affect the bake.
+# Changes that give a warning and do not affect the bake: (change, code of the warning, text in its message).
 WARNED = {
     "missing normal map": (at("images.1", GONE), "missing-texture", "normalTexture"),
     "missing metallic-roughness map": (at("images.2", GONE), "missing-texture", "metallicRoughnessTexture"),
@@ -237,7 +242,7 @@ WARNED = {
     "morph target": (accessor("POSITION", "bufferView", 999, TARGET), "broken-attribute", "morph target 0"),
 }
 
-# Changes that a bake refuses, with words of the sentence.
+# Changes that a bake refuses: (change, texts in the error message).
 REFUSED = {
     "missing base colour": (at("images.0", GONE), ["images[0].uri", "gone.png", "missing"]),
     "base colour is text": (at("images.0", {"uri": "data:,hello"}), ["images[0]", "cannot be decoded"]),

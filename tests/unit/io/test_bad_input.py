@@ -1,4 +1,4 @@
-"""Broken files: each gives one sentence that names the file and the place, never a traceback."""
+"""Loading a broken file raises a one-sentence error that names the file and the broken member."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from baker.io.load import load_scene
 
 
 def refuse(path, *words):
-    """Check that loading fails with one sentence holding all `words`, and return the error."""
+    """Assert that loading raises an InputError of one line that contains all `words`. Return the error."""
     with pytest.raises(InputError) as caught:
         load_scene(path)
     error = caught.value
@@ -249,7 +249,7 @@ def test_files_that_hold_no_surface_say_so(tmp_path):
 
 
 def survives(path, data):
-    """Load possibly broken bytes: a scene or a clear error; anything else is raised."""
+    """Load bytes that may be broken. Return True for a scene, False for a BakerError; raise other errors."""
     path.write_bytes(data)
     try:
         scene = load_scene(path)

@@ -1,4 +1,4 @@
-"""Locks of output folders end with their process."""
+"""The lock of an output folder is released when its process ends, also after a kill."""
 
 from __future__ import annotations
 

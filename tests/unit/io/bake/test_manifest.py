@@ -23,7 +23,10 @@ VALIDATOR = jsonschema.Draft202012Validator(manifest_schema())
 
 
 def bake(result: BakeResult, out: Path) -> dict:
-    """Write a bake and return bake.json, which has to obey the schema and be what `write_bake` returned."""
+    """Write a bake and return its bake.json.
+
+    Asserts that bake.json is valid against the schema and equal to the manifest that `write_bake` returns.
+    """
     returned = write_bake(result, out)
     manifest = json.loads((out / "bake.json").read_text("utf-8"), parse_constant=pytest.fail)
     assert [e.message for e in VALIDATOR.iter_errors(manifest)] == []

@@ -1,4 +1,4 @@
-"""Every reader refuses a damaged or hostile manifest with one sentence."""
+"""Functions that read a manifest refuse a damaged or hostile one with a one-sentence error."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def damage(out: Path, path: tuple[str | int, ...], value: Any) -> None:
 
 
 def refusal(function: Callable[[Path], object], out: Path) -> str | None:
-    """Return the message with which a function refuses a folder; None if it does not."""
+    """Return the message of the InputError that `function(out)` raises, or None if it raises no error."""
     try:
         function(out)
     except InputError as error:
@@ -49,7 +49,7 @@ def refusal(function: Callable[[Path], object], out: Path) -> str | None:
 
 
 def paths_in(value: Any, path: tuple[str | int, ...] = ()) -> list[tuple[str | int, ...]]:
-    """Return the path of every value in a manifest."""
+    """Return the path, a tuple of keys and indices, of every value in a manifest."""
     items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     return [
         *([path] if path else []),
@@ -90,7 +90,7 @@ def test_what_cannot_be_is_refused(out: Path, path: tuple[str | int, ...], value
 
 
 def test_any_value_of_any_other_type_is_refused_or_read(out: Path) -> None:
-    """Replace one value of the manifest at a time: only errors of baker itself are raised."""
+    """With one value of the manifest replaced, readers either succeed or raise an InputError."""
     text = (out / "bake.json").read_text()
     values = [None, -1, 2**70, 1e300, "\x1b[31m", [], {}, [[]], True]
     refused = read = 0
@@ -108,7 +108,7 @@ def test_any_value_of_any_other_type_is_refused_or_read(out: Path) -> None:
 
 
 def test_the_ranges_of_encodings_are_read_back(tmp_path: Path) -> None:
-    """The largest number that an encoding holds may be the largest of float32."""
+    """The largest value of an encoding, `max` in the manifest, may be as large as the largest float32."""
     result = quad_result(tmp_path / "in")
     settings = make_settings({"encode": ["hdr", "rgbm"]})
     manifest = write_bake(replace(result, settings=settings), tmp_path / "out")
@@ -145,7 +145,7 @@ def test_a_manifest_that_names_a_file_outside_is_not_bakers(out: Path, tmp_path:
     assert own_files(out) is None
     with pytest.raises(SettingsError, match="did not write"):
         check_out(out)
-    # Forced, and in place because the folder cannot be renamed.
+    # Write with `force`. The working directory is not renamed, so its files are replaced one by one.
     here = Path.cwd()
     os.chdir(out)
     try:

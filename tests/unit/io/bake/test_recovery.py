@@ -1,4 +1,4 @@
-"""A kill at any step of writing leaves the whole old bake or the whole new one, at most one command later."""
+"""After a kill at any step of writing, the next command restores the complete old or complete new bake."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from baker.io.temporary import TemporaryFolder, temporaries
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="kills forked processes")
 
-# Events of sys.audit before a call of the system that changes a folder.
+# Audit events that Python raises before a system call that changes a folder.
 CHANGES = ("os.rename", "os.mkdir", "os.rmdir", "os.remove", "os.link", "os.chmod", "os.utime")
 OURS = {"bake.json", "a.exr", "old.exr", "new.exr", "unity/a.txt", "godot/a.txt"}
 
 
 def write(out: Path, word: str, names: tuple[str, ...]) -> None:
-    """Write a bake of small files, as `write_bake` does."""
+    """Write a bake of text files that contain `word`, in the same steps as `write_bake`."""
     check_out(out)
     with held(out), OutputFolder(out) as folder:
         for name in names:
@@ -55,7 +55,10 @@ def tree(folder: Path) -> dict[str, str]:
 
 
 def ends_by_kill(work: Callable[[], object], step: int) -> bool:
-    """Run `work` in a forked process that is killed before its change number `step`; False if it ended."""
+    """Run `work` in a forked process and kill it before its change number `step`, counted from 0.
+
+    Return False if the process ended without being killed.
+    """
     child = os.fork()
     if child:
         _, status = os.waitpid(child, 0)
@@ -81,7 +84,11 @@ def ends_by_kill(work: Callable[[], object], step: int) -> bool:
 
 @pytest.fixture(params=["exchange", "no exchange", "current folder"])
 def out(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Return an output folder that holds files of the user, and is replaced in one of the possible ways."""
+    """Yield an output folder with an old bake and files of the user.
+
+    The parameter selects how a new bake replaces the old one: by exchanging the two folders, without an
+    exchange, or file by file because the folder is the working directory.
+    """
     out = tmp_path / "parent" / "out"
     out.mkdir(parents=True)
     if request.param == "no exchange":
@@ -97,7 +104,7 @@ def out(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def whole(out: Path) -> str:
-    """Return which of the bakes a folder holds; fails if it holds a part or more than one of them."""
+    """Return "old" or "new", the bake in a folder. Fails if files are missing or both bakes are mixed."""
     own, files = own_files(out), tree(out)
     assert own is not None
     assert own == set(files) & OURS
@@ -144,7 +151,7 @@ def test_the_next_bake_is_such_a_command(out: Path) -> None:
 
 @pytest.mark.parametrize("read", [read_manifest, inspect_path, lambda out: inspect_path(out / "bake.json")])
 def test_so_is_a_command_that_only_reads(out: Path, read: Callable[[Path], object]) -> None:
-    """`verify`, `diff` and `view` read the manifest, too. These files of the test are no valid bake."""
+    """`verify`, `diff` and `view` read the manifest, too. It is invalid here, so each function raises."""
     step = 0
     while ends_by_kill(lambda: write_new(out), step):
         with pytest.raises(InputError, match="manifest is damaged"):

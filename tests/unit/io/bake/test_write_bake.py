@@ -31,7 +31,7 @@ NAMES = ["ao_0.exr", "bake.json", "irradiance_0.exr", "scene.glb", "status_0.png
 
 
 def tree(folder: Path) -> dict[str, bytes]:
-    """Return every file below a folder with its bytes."""
+    """Return {relative path: content} of every file below a folder."""
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
@@ -184,7 +184,7 @@ def test_progress_can_cancel(tmp_path: Path) -> None:
 
 
 def test_a_real_full_disk_is_one_sentence(tmp_path: Path) -> None:
-    """Limit the size of any file in a process of its own: the system then refuses to write on."""
+    """Simulate a full disk by limiting the size of files to 1000 bytes in a separate process."""
     code = (
         "import resource, sys; from pathlib import Path; from io_scenes import quad_result\n"
         "from baker.io.bake.write_bake import write_bake\n"
@@ -254,7 +254,7 @@ def test_a_place_that_cannot_be_written_is_found_before_the_work(
     with pytest.raises(ResourceError, match="nothing can be written to") as caught:
         check_out(locked / "new" / "out")
     assert caught.value.exit_code == 4
-    # The folder itself may be written to, though it cannot be renamed.
+    # The parent is read-only, so the output folder cannot be renamed, but files in it can be written.
     write_bake(quad_result(tmp_path / "in"), out)
     assert names(out) == NAMES
 

@@ -42,7 +42,7 @@ def scene_of(*matrices: np.ndarray, lights: tuple[PunctualLight, ...] = ()) -> S
         Material("paint", (0.5, 0.25, 1.0, 1.0), TEXTURE, double_sided=True, metallic=0.0),
         Material("lamp", emission=(10.0, 20.0, 5.0)),
     )
-    # Instances are in another order than their nodes.
+    # Instance k has the node count - 1 - k, so that the order of instances differs from that of nodes.
     count = len(matrices)
     instances = tuple(Instance(count - 1 - k, f"i{k}", 0, m) for k, m in enumerate(matrices))
     return Scene("hand-made", None, (two_material_mesh(),), materials, instances, lights)
@@ -110,7 +110,7 @@ def test_a_linear_float_texture_is_stored_as_srgb() -> None:
     paint = replace(scene.materials[0], base_colour_texture=Texture(linear))
     after = write(replace(scene, materials=(paint, scene.materials[1])))
     image = Image.open(io.BytesIO(after.view(after.json["images"][0]["bufferView"])))
-    # 0.21586 is the linear value of sRGB 128; 0.002 lies on the straight part: 0.002 * 12.92 * 255 = 6.6.
+    # 0.21586 is the linear value of sRGB 128. 0.002 is in sRGB's linear segment: 0.002 * 12.92 * 255 = 6.6.
     assert np.asarray(image).tolist() == [[[0, 7, 128, 255], [255, 188, 255, 128]]]
 
 

@@ -1,4 +1,4 @@
-"""Accessors against values worked out by hand or by `struct`."""
+"""Reading glTF accessors: strides, offsets, normalised integers, sparse rows and quantised positions."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def read(builder, tmp_path, index, types):
 def test_interleaved_rows_are_found_by_stride_and_offset(tmp_path):
     builder = GltfBuilder()
     rng = np.random.default_rng(1)
-    rows = rng.random((5, 8), np.float32)  # position 3, normal 3, uv 2
+    rows = rng.random((5, 8), np.float32)  # columns: position 3, normal 3, uv 2
     view = builder.view(rows.tobytes(), byteStride=32)
     for offset, width in ((0, "VEC3"), (12, "VEC3"), (24, "VEC2")):
         builder.add(
@@ -42,7 +42,7 @@ def test_normalised_integers_follow_the_specification(tmp_path, dtype):
     at = builder.accessor(np.stack([value, value], axis=1), normalized=True)
     got = read(builder, tmp_path, at, ("VEC2",))
     expected = [max(float(v) / info.max, -1.0) for v in value.tolist()]
-    # One division in single precision: within half a step of the exact quotient.
+    # The reader divides once in single precision, so the relative error is at most half a float32 step.
     np.testing.assert_allclose(got[:, 0], expected, rtol=1e-7, atol=0)
     assert got[-1, 0] == 1.0
 

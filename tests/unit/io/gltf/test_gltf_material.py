@@ -1,4 +1,4 @@
-"""Materials and textures: every value that a bake reads, from file to `Material`."""
+"""The glTF importer copies all material and texture values that a bake reads to `Material`."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def test_an_unknown_model_without_a_base_colour_reflects_half(tmp_path, name):
         assert len(found) == 1
         assert found[0].object == "odd"
         assert name in found[0].message
-    # A base colour beside it is the fallback that its author meant.
+    # If the core material has a base colour, that colour is the author's fallback for the extension.
     material, found = load(pbrMetallicRoughness={"baseColorFactor": [0.1, 0.2, 0.3, 1]})
     assert (material.base_colour, found) == ((0.1, 0.2, 0.3, 1), [])
 
@@ -205,7 +205,8 @@ def test_texture_transform_overrides_the_set_and_scales_then_turns_then_shifts(t
 
 
 def test_texture_transform_gives_the_quadrant_of_the_extensions_example():
-    # "utilizes only the lower left quadrant of the source image, rotated clockwise"; v points down.
+    # The specification of KHR_texture_transform describes this example: "utilizes only the lower left
+    # quadrant of the source image, rotated clockwise". v points down.
     matrix = texture_transform((0, 1), math.pi / 2, (0.5, 0.5))
     corner = np.array([[u, v, 1] for u in (0, 1) for v in (0, 1)]) @ matrix.T
     np.testing.assert_allclose(corner.min(axis=0), (0, 0.5), atol=1e-15)
@@ -229,7 +230,7 @@ def test_grey_images_of_eight_and_sixteen_bits(pixels, expected):
 def test_jpeg_and_palette_images_decode_to_opaque_rgba():
     flat = np.full((8, 8, 3), (200, 100, 50), np.uint8)
     jpeg = decode_image(encode(flat, "JPEG", quality=95), file="f", object="o")
-    assert np.abs(jpeg[..., :3].astype(int) - flat).max() <= 3  # the format's own loss
+    assert np.abs(jpeg[..., :3].astype(int) - flat).max() <= 3  # JPEG is lossy
     stream = io.BytesIO()
     Image.fromarray(flat).convert("P", palette=Image.Palette.ADAPTIVE).save(stream, "PNG")
     palette = decode_image(stream.getvalue(), file="f", object="o")

@@ -1,4 +1,4 @@
-"""Primitives, flat normals, and which triangles are left out, against slow twins."""
+"""glTF primitives: modes, flat normals and left-out triangles, compared with slow reference functions."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def test_a_back_face_goes_only_if_its_front_shows_both_sides(tmp_path, same_mate
 
 
 def slow_duplicates(position, triangle, material, double_sided):
-    first, out = [], []  # the first triangle of each place and winding
+    first, out = [], []  # first: (index, corners) of the first triangle at given positions
     for t, row in enumerate(triangle):
         corners = [tuple(float(x) + 0.0 for x in position[v]) for v in row]
         turned = {tuple(corners[k:] + corners[:k]) for k in range(3)}

@@ -1,4 +1,4 @@
-"""What stands where: skins posed by their joints, instances of one node, hidden nodes."""
+"""World positions of skinned meshes and of `EXT_mesh_gpu_instancing` instances, and hidden nodes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,11 @@ from baker.io.load import load_scene
 
 
 def skinned(bind, joints, weights=None, joint=None, **node):
-    """Return a square skinned to joints (members of nodes) with inverse bind matrices; node 0 shows it."""
+    """Return a builder with a skinned square at node 0.
+
+    `bind` has the inverse bind matrices, `joints` the members of each joint's node, and `node` more members
+    of node 0. `weights` and `joint` are (4, 4): the joint weights and joint indices of the four vertices.
+    """
     b = GltfBuilder()
     joint = np.zeros((4, 4), np.uint8) if joint is None else np.uint8(joint)
     weights = np.float32([[1, 0, 0, 0]] * 4) if weights is None else np.float32(weights)
@@ -59,7 +63,7 @@ def test_scales_of_joint_and_bind_pose_cancel(tmp_path):
 
 def test_weights_blend_matrices_and_are_normalised(tmp_path):
     weights = [[1, 0, 0, 0], [0, 2, 0, 0], [0.5, 0.5, 0, 0], [0, 0, 0, 0]]
-    joint = [[0, 1, 9, 9]] * 4  # joints of no weight may be anything
+    joint = [[0, 1, 9, 9]] * 4  # a joint index with weight 0 may be invalid
     builder = skinned(None, [{}, {"translation": [0, 0, 4]}], weights, joint)
     expected = QUAD + np.float32([[0, 0, 0], [0, 0, 4], [0, 0, 2], [0, 0, 0]])
     scene = load_scene(write(tmp_path / "a.glb", builder))

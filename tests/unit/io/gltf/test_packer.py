@@ -10,7 +10,10 @@ from baker.io.gltf.packer import Packer
 
 
 def random_document(seed: int) -> tuple[dict, tuple[bytes, ...], frozenset[int]]:
-    """Return two buffers with overlapping views of all alignments, an accessor each, and some to give up."""
+    """Return (document, buffers, indices of the accessors to be replaced).
+
+    Each of the two buffers has six views at random offsets, which may overlap. Each view has one accessor.
+    """
     rng = np.random.default_rng(seed)
     buffers = tuple(rng.integers(0, 256, size).astype(np.uint8).tobytes() for size in (203, 96))
     views, accessors = [], []

@@ -20,7 +20,7 @@ PNG = {page: encode_png(np.full((16, 16), 100 + page, np.uint8)) for page in ran
 
 
 def triangle_set(corners: dict[str, np.ndarray]) -> set[tuple[bytes, ...]]:
-    """Return the triangles as a set, each the bytes of all attributes at its three corners."""
+    """Return a set with one tuple per triangle: the bytes of each attribute at the three corners."""
     names = sorted(corners)
     count = len(corners[names[0]])
     return {tuple(corners[name][t].tobytes() for name in names) for t in range(count)}
@@ -28,7 +28,7 @@ def triangle_set(corners: dict[str, np.ndarray]) -> set[tuple[bytes, ...]]:
 
 @pytest.fixture
 def rich(tmp_path: Path) -> tuple[Glb, Glb, Scene]:
-    """Return the rich document before and after, and its scene."""
+    """Return the document of `rich_builder`, the document that `make_glb` writes for it, and the scene."""
     path = write(tmp_path / "rich.glb", rich_builder())
     scene = load_scene(path)
     assert [i.node for i in scene.instances] == [0, 1, 5]
@@ -74,7 +74,7 @@ def test_strip_becomes_triangles_with_its_winding(rich: tuple[Glb, Glb, Scene]) 
 
 
 def test_texcoord_1_is_the_layout(rich: tuple[Glb, Glb, Scene]) -> None:
-    """Each triangle's (position, uv) corners in the file are those of the layout, whole and exact."""
+    """The triangle corners in the file have exactly the positions and uv of the layout."""
     _, after, scene = rich
     atlas = [split_layout(scene, 0), split_layout(scene, 1), split_layout(scene, 2)]
     for layout, instance in zip(atlas, scene.instances, strict=True):
@@ -184,7 +184,7 @@ def test_replaced_data_leaves_the_file(tmp_path: Path) -> None:
     builder, path = plain(tmp_path)
     scene = load_scene(write(path, builder))
     after = Glb(make_glb(scene, make_atlas(split_layout(scene, 0))).data)
-    # Six corners: position 12, normal 12, uv 8 bytes each, and six 16 bit indices.
+    # Six vertices of 12 (position) + 12 (normal) + 8 (uv) bytes, and six 16-bit indices.
     assert len(after.binary) == 6 * 32 + 12
     assert len(after.json["accessors"]) == 4
     assert len(after.json["bufferViews"]) == 4

@@ -1,4 +1,4 @@
-"""Nodes, instances, lights, scenes and the importer's warnings and errors."""
+"""The glTF importer: nodes, instances, lights, scenes, warnings and errors."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def codes(scene):
 
 
 def turn(axis, angle):
-    """Return a rotation by Rodrigues' formula, another way than by quaternion components."""
+    """Return the (3, 3) rotation about a unit axis by Rodrigues' formula, independent of quaternions."""
     k = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
     return np.eye(3) + math.sin(angle) * k + (1 - math.cos(angle)) * k @ k
 
@@ -110,7 +110,8 @@ def test_lights_stand_and_shine_where_their_nodes_do(tmp_path):
     half = math.sqrt(0.5)
     for k in range(4):
         place = {"extensions": {"KHR_lights_punctual": {"light": k}}, "translation": [k, 1, 2]}
-        # A quarter turn about x points -z down at -y; the scale must not change the direction's length.
+        # A rotation by -90 degrees about x turns the light's axis -z to -y. The scale must not change the
+        # length of the direction.
         builder.node(**place, rotation=[-half, 0, 0, half], scale=[2, 2, 5])
     bulb, spot, sun, plain = load(tmp_path, builder).lights
     assert [light.kind for light in (bulb, spot, sun, plain)] == ["point", "spot", "directional", "spot"]
@@ -125,7 +126,10 @@ def test_lights_stand_and_shine_where_their_nodes_do(tmp_path):
 
 
 def lit(light, *chain):
-    """Return a builder whose light hangs below nested nodes of these members, the outermost first."""
+    """Return a builder with nested nodes and a light on the innermost one.
+
+    `chain` has the members of each node, the outermost first.
+    """
     builder = quad_builder()
     builder.json["extensions"] = {"KHR_lights_punctual": {"lights": [light]}}
     nodes = [{**members} for members in chain]
@@ -138,7 +142,7 @@ def lit(light, *chain):
 
 
 TURN = {"rotation": [-math.sqrt(0.5), 0, 0, math.sqrt(0.5)], "name": "lamp"}
-# The same in single precision as exporters write it.
+# The rotation of TURN rounded to single precision, as exporters write it.
 TURN_32 = {"rotation": [float(np.float32(v)) for v in TURN["rotation"]], "name": "lamp"}
 SQUEEZE = [
     [{"scale": [1, 0, 1]}, TURN],
@@ -172,7 +176,7 @@ def test_a_light_without_a_direction_is_named_and_left_out(tmp_path, chain, kind
         ([{"scale": [1, -1, 1]}, TURN], (0, 1, 0)),
         ([{"scale": [0, 1, 0]}, TURN], (0, -1, 0)),
         ([{"scale": [1, 1, 0], "name": "lamp"}], None),
-        # A shear that leans -Z far over: x grows by 1000 z.
+        # The shear x += 1000 z turns the light's axis -Z almost to -X.
         ([{"name": "l", "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 1000, 0, 1, 0, 0, 0, 0, 1]}], (-1000, 0, -1)),
     ],
 )
@@ -199,7 +203,7 @@ def test_a_light_under_a_matrix_that_is_not_finite_is_bad_input(tmp_path, value,
 def test_the_range_of_a_light_is_read(tmp_path):
     assert load(tmp_path, lit({"type": "point", "range": 2.5}, TURN)).lights[0].range == 2.5
     assert load(tmp_path, lit({"type": "spot"}, TURN)).lights[0].range == math.inf
-    # The range of a light at infinity means nothing.
+    # The range of a directional light is ignored.
     assert load(tmp_path, lit({"type": "directional", "range": 1}, TURN)).lights[0].range == math.inf
     assert load(tmp_path, lit({"type": "point", "range": 2.5}, TURN)).warnings == ()
 

@@ -1,4 +1,4 @@
-"""PLY, STL and OFF files written here by hand."""
+"""The importers of PLY, STL and OFF files."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ def load(tmp_path, name, data, **options):
 
 
 def square_of(scene):
-    """Return the corner positions of the two triangles, after checking what all formats share."""
+    """Return the corner positions (2, 3, 3) of the scene's two triangles.
+
+    Asserts the instance, material and normals, which are the same for all formats.
+    """
     mesh = scene.meshes[0]
     assert [(i.node, i.mesh) for i in scene.instances] == [(0, 0)]
     assert scene.materials[0].base_colour == (0.8, 0.8, 0.8, 1)
@@ -62,9 +65,10 @@ def test_ply_with_normals_colours_and_a_quad(tmp_path):
     )
     scene = load(tmp_path, "a.ply", PLY_HEAD.format("ascii", 4, more, 1) + body)
     mesh = scene.meshes[0]
-    assert mesh.triangle.tolist() == [[0, 1, 2], [0, 2, 3]]  # given normals: vertices stay shared
+    assert mesh.triangle.tolist() == [[0, 1, 2], [0, 2, 3]]  # vertices with normals stay shared
     np.testing.assert_array_equal(mesh.normal, [[0, 0, 1]] * 4)
-    np.testing.assert_allclose(mesh.colour[:, 0], [0, 0.0908417, 0.4019778, 1], rtol=1e-5)  # sRGB 85, 170
+    # The second and third value are the linear values of sRGB 85 and 170.
+    np.testing.assert_allclose(mesh.colour[:, 0], [0, 0.0908417, 0.4019778, 1], rtol=1e-5)
     np.testing.assert_array_equal(mesh.colour[:, 1:], [[1, 0, 1]] * 4)
 
 

@@ -1,4 +1,4 @@
-"""OBJ and MTL: geometry, relative indices, materials, and the errors for defects."""
+"""The importer of OBJ and MTL files: geometry, relative indices, materials and errors."""
 
 from __future__ import annotations
 
@@ -34,12 +34,13 @@ def codes(scene):
 
 
 def test_relative_indices_count_back_from_where_they_stand(tmp_path):
-    # Squares of side 1, 2 and 3, each from the four lines before it; the last face reaches further back.
+    # Squares of side 1, 2 and 3. Each face refers to the four vertices before it. The last face refers to the
+    # vertices of the first square.
     text = ""
     for side in (1, 2, 3):
         text += "".join(f"v {x * side} {y * side} {side}\n" for x, y in ((0, 0), (1, 0), (1, 1), (0, 1)))
         text += "f -4 -3 -2 -1\n"
-    text += "f -9 -10 -11 -12\n"  # the first square from behind
+    text += "f -9 -10 -11 -12\n"  # the first square with opposite winding
     scene = load(tmp_path, text)
     assert scene.n_triangles == 8
     assert area(scene) == pytest.approx(1 + 4 + 9 + 1)
@@ -100,7 +101,7 @@ def test_up_and_scale_are_put_into_the_positions(tmp_path):
     np.testing.assert_allclose(mesh.position[0], (0.01, 0.03, -0.02), rtol=1e-6)
     np.testing.assert_array_equal(mesh.normal, [[0, 1, 0]] * 3)
     corner = mesh.position[mesh.triangle[0]].astype(float)
-    assert np.cross(corner[1] - corner[0], corner[2] - corner[0])[1] > 0  # a turn, not a mirror
+    assert np.cross(corner[1] - corner[0], corner[2] - corner[0])[1] > 0  # rotated, not mirrored
 
 
 def test_textures_with_options_and_blanks_in_names(tmp_path):
@@ -115,7 +116,8 @@ def test_textures_with_options_and_blanks_in_names(tmp_path):
     texture = material.base_colour_texture
     np.testing.assert_array_equal(texture.image, pixels)
     assert texture.wrap == ("clamp", "clamp")
-    # In OBJ's uv the point is (2 * 0.25 + 0.5, 4 * 0.125) = (1, 0.5); v counts from below.
+    # In OBJ, where v points up, the transformed uv is (2 * 0.25 + 0.5, 4 * 0.125) = (1, 0.5). In the scene,
+    # where v points down, it is (1, 1 - 0.5), the same point.
     u, v = scene.meshes[0].texcoord[0][0]
     np.testing.assert_allclose(texture.transform @ (u, v, 1), (1, 0.5))
     assert material.emission == (1, 1, 1)
