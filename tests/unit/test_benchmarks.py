@@ -14,7 +14,7 @@ FOLDER = ROOT / "benchmarks"
 
 
 def load(name):
-    """Import a benchmark's file under a name that no test helper has."""
+    """Import a benchmark's file as a module whose name differs from those of test helpers."""
     spec = importlib.util.spec_from_file_location(f"benchmark_{name}", FOLDER / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -45,7 +45,7 @@ def test_series_scene_is_a_closed_room_whose_faces_and_normals_agree(blobs):
         size = np.linalg.norm(face, axis=1) * np.linalg.norm(shading, axis=1)
         cosine = (face * shading).sum(axis=1) / size
         assert cosine.min() > 0.8, mesh.name
-        # A closed surface's area vectors cancel; the sign of the volume gives the orientation.
+        # The area vectors of a closed surface sum to 0. The sign of the volume gives the orientation.
         volume[mesh.name] = (np.cross(corner[:, 0], corner[:, 1]) * corner[:, 2]).sum() / 6
         if mesh.name != "lamp":
             np.testing.assert_allclose(face.sum(axis=0), 0, atol=1e-4)

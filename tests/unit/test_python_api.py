@@ -1,4 +1,4 @@
-"""What Python programs call: names, settings, results, docs; also after every package has been imported."""
+"""The Python API: names, settings, results, errors and docs."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_each_stage_alone_before_and_after_a_bake():
 
 
 def test_no_module_hides_a_function():
-    """Packages are nouns and functions are verbs."""
+    """No package or module of `baker` has the name of an API function."""
     modules = {found.name for found in pkgutil.iter_modules(baker.__path__)}
     assert modules & {*baker.__all__} == set()
 
@@ -209,7 +209,7 @@ def test_the_page_of_the_api_is_current():
 
 
 def test_examples_run(tmp_path, monkeypatch):
-    """The examples of all functions, in the order of the page: later ones use what earlier ones made."""
+    """Run the examples of all functions in a fixed order, because later ones use results of earlier ones."""
     monkeypatch.chdir(tmp_path)
     shutil.copy(CORNELL, tmp_path / "cornell.glb")
     names = {"baker": baker}

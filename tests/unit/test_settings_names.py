@@ -1,4 +1,4 @@
-"""The library names settings, the command line turns the names into flags; no library text names a flag."""
+"""Messages of the library contain names of settings, never flags. The command line shows them as flags."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from baker.verification.settings import VerifySettings
 
 BAKER = Path(__file__).parents[2] / "baker"
 FLAG = re.compile(r"(?<![\w-])--[a-z]")
-# Flags of other programs, and Python files that other programs run.
+# Texts with flags of other programs.
 OTHERS = ("blender --python",)
 
 
 def texts(path):
-    """Yield (line, text) of the string literals of a file, without the docstrings of those that have one."""
+    """Yield (line, text) of the string literals of a file, without docstrings."""
     tree = ast.parse(path.read_text("utf-8"))
     docs = set()
     for node in ast.walk(tree):

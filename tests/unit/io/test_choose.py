@@ -1,4 +1,4 @@
-"""Which objects take part: patterns of names and paths, what is below a node, lights."""
+"""The settings `include` and `exclude` choose objects and lights by the name or path of their nodes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from baker.io.load import load_for_bake
 
 @pytest.fixture
 def level(tmp_path):
-    """Return a file: Floor; House with Wall, UCX_Wall and a light; Shed with Wall."""
+    """Return a file with the nodes Floor, House and Shed.
+
+    House has the children Wall, UCX_Wall and Bulb, which is a light. Shed has another child Wall.
+    """
     b = GltfBuilder()
     b.json["extensions"] = {"KHR_lights_punctual": {"lights": [{"type": "point"}]}}
 

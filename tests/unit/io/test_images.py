@@ -1,4 +1,4 @@
-"""Decoding of image files in strips, and averaging of images that are larger than light needs."""
+"""Image files are decoded in strips of rows, and images above `LARGEST_IMAGE_SIDE` are averaged."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_large_images_are_averaged_in_linear_light(shape, monkeypatch):
     assert found.shape == (h, w, 4)
     blocks = pixels[: 2 * h, : 2 * w].reshape(h, 2, w, 2, 4)
     light = linear_from_srgb(blocks[..., :3] / 255.0).mean(axis=(1, 3))
-    # Eight bits round by half a level.
+    # The average is rounded to 8 bits, so its error is at most half a level.
     low, high = (linear_from_srgb(np.clip(found[..., :3] + d, 0, 255) / 255.0) for d in (-0.51, 0.51))
     assert ((low <= light) & (light <= high)).all()
     alpha = blocks[..., 3].mean(axis=(1, 3))

@@ -19,10 +19,10 @@ def test_a_scene_is_counted(tmp_path: Path) -> None:
     json.dumps(found, allow_nan=False)
     assert found["kind"] == "scene"
     assert found["triangles"] == 4 + 4 + 2
-    # The first node's mesh is skinned: it has a shape of its own.
+    # Nodes 0 and 1 have the same mesh in the file. Node 0 is skinned, so its posed mesh is a separate one.
     assert [m["instances"] for m in found["meshes"]] == [1, 1, 1]
     assert [i["node"] for i in found["instances"]] == [0, 1, 5]
-    # Squares at x 0 to 1 and 3 to 4, z 0 and 1; one more at y 3 to 4.
+    # The squares lie at x = 0 to 1 or 3 to 4, and at z = 0 or 1. One square lies at y = 3 to 4.
     assert (found["box"]["min"], found["box"]["max"]) == ([0, 0, 0], [4, 4, 1])
     assert found["box"]["diagonal"] == pytest.approx(np.sqrt(33))
     assert [(c["node"], c["name"], c["position"]) for c in found["cameras"]] == [(3, "eye", [0, 0, 5])]

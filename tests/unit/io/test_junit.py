@@ -1,4 +1,4 @@
-"""JUnit reports: counts, escapes, and files that are whole or not there."""
+"""JUnit reports: counts, XML escapes, and files that are written completely or not at all."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One thing broken at a time: what a bake needs is refused by name, what it does not need never stops it."""
+"""glTF files with one broken member: an error if the bake needs the member, otherwise at most a warning."""
 
 from __future__ import annotations
 
@@ -23,14 +23,17 @@ from baker.io.load import load_scene
 
 
 def changed(tmp_path: Path, change: Callable[[Document], Any]) -> Path:
-    """Write the file with one change: of its JSON, or of the bytes that the change returns."""
+    """Write the test file after `change`, which edits the document or returns new bytes of the buffer."""
     document = copy.deepcopy(DOCUMENT)
     data = change(document)
     return write(tmp_path / "a.glb", pack_glb(document, data if isinstance(data, bytes) else BLOB))
 
 
 def written(path: Path) -> Glb:
-    """Bake without rays: load, check that all a bake needs is as in the whole file, write, read again."""
+    """Load a file, write the `scene.glb` of a bake without tracing, and return it.
+
+    Asserts that the data which a bake needs equal those of the unchanged test file.
+    """
     scene, whole = load_scene(path), load_scene(write(path.parent / "whole.glb", WHOLE))
     assert np.array_equal(scene.meshes[0].position, whole.meshes[0].position)
     assert np.array_equal(scene.meshes[0].normal, whole.meshes[0].normal)
@@ -47,7 +50,7 @@ def written(path: Path) -> Glb:
 
 
 def kept(before: Any, after: Any) -> None:
-    """Check that lists of the document have lost and renumbered nothing, apart from what was baked."""
+    """Assert that the lists of the document `after` keep the elements of `before` at the same indices."""
     for key in ("skins", "animations", "cameras", "samplers", "textures"):
         assert after.get(key, [])[: len(before.get(key, []))] == before.get(key, [])
     for key in ("nodes", "meshes", "materials", "images"):
@@ -126,7 +129,7 @@ CHUNK = struct.pack("<II", 8, 0x454D4341) + b"whatever"
 
 
 def container(change: str) -> bytes:
-    """Return the whole file as GLB bytes with a fault of its container."""
+    """Return the unchanged test file as a GLB with a modified header or modified chunks."""
     data = WHOLE.glb()
     size = struct.unpack_from("<I", data, 12)[0]
     text, binary = data[12 : 20 + size], data[20 + size :]

@@ -11,7 +11,7 @@ from baker.io.png import encode_palette_png, encode_png, grey_levels, srgb_level
 
 
 def chunks(data: bytes) -> dict[bytes, bytes]:
-    """Return a PNG's chunks, whose checksums have to hold."""
+    """Return {type: data} of the chunks of a PNG. Asserts that their checksums are correct."""
     assert data.startswith(b"\x89PNG\r\n\x1a\n")
     found, at = {}, 8
     while at < len(data):
@@ -52,7 +52,7 @@ def test_levels_round_and_clamp() -> None:
         255,
         255,
     ]
-    # sRGB is its own inverse formula: linear values of the codes 0, 10, 11, 128, 255.
+    # `linear` has the linear values of these sRGB codes. The linear segment of sRGB ends between 10 and 11.
     code = np.array([0, 10, 11, 128, 255]) / 255
     linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
     assert srgb_levels(linear.astype(np.float32)).tolist() == [0, 10, 11, 128, 255]

@@ -1,4 +1,4 @@
-"""Files that a scene names: those outside its folder are not read, unless the user allows it."""
+"""Files that a scene refers to are not read outside the scene's folder, unless `allow_outside` is set."""
 
 from __future__ import annotations
 
@@ -28,7 +28,10 @@ def picture() -> bytes:
 
 @pytest.fixture
 def place(tmp_path: Path) -> Path:
-    """Return a folder of scenes; a secret, a picture and two links to them are around it."""
+    """Return the folder `pack/level` for scenes.
+
+    `pack` contains the files `secret` and `wood.png`. The folder has links to `secret` and to `pack`.
+    """
     folder = tmp_path / "pack" / "level"
     (folder / "sub").mkdir(parents=True)
     (tmp_path / "pack" / "secret").write_bytes(MARK * 4)
@@ -40,7 +43,7 @@ def place(tmp_path: Path) -> Path:
 
 
 def with_buffer(uri: str, **material: object) -> GltfBuilder:
-    """Return a quad with an unused second buffer."""
+    """Return a quad with a second buffer, the file `uri`, that nothing uses."""
     builder = quad_builder(**material)
     document = builder.document
 
@@ -121,7 +124,7 @@ def test_files_below_the_folder_are_read(place: Path) -> None:
     ):
         scene = load_scene(write(place / "a.gltf", with_image(uri, used=True)))
         assert scene.materials[0].base_colour_texture is not None
-    # A folder that is itself reached by a link is the scene's folder all the same.
+    # The path to the scene's folder may contain a link.
     (place.parent / "door").symlink_to("level")
     load_scene(place.parent / "door" / "a.gltf")
 
@@ -193,7 +196,7 @@ def test_every_command_that_reads_a_scene_has_the_flag(
 
 
 def test_the_scene_of_a_bake_names_no_file(place: Path) -> None:
-    """The scene of OUT holds all its data: what else it names is not read, whoever changed it."""
+    """`scene.glb` of a bake contains all its data. Other files that it refers to are not read."""
     path = write(place / "a.gltf", with_image("../wood.png", used=True))
     with pytest.raises(InputError, match="holds all its data"):
         load_scene(path, self_contained=True)

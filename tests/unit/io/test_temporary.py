@@ -1,4 +1,4 @@
-"""Temporary folders: their names, and files that are either whole or as they were."""
+"""Temporary folders are found by their names, and files are written completely or not at all."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_no_temporary_folders_where_nothing_is(tmp_path: Path) -> None:
 
 
 def test_the_lock_decides_whether_a_writer_lives(tmp_path: Path) -> None:
-    """The process that wrote the number of this process in its name has ended; it is no sign of life."""
+    """A folder without a lock is abandoned, even if its name has the number of a running process."""
     out = tmp_path / "out"
     written = TemporaryFolder(out)
     written.create()

@@ -1,4 +1,4 @@
-"""JOBS.toml: what it may say, what is refused, and which files a pattern finds."""
+"""JOBS.toml: keys, errors, and the files that a pattern matches."""
 
 from __future__ import annotations
 

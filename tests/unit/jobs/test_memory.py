@@ -1,4 +1,4 @@
-"""Sizes as people write them; estimates of memory grow with what they are made of."""
+"""Parsing of memory sizes, and the dependence of the memory estimate on settings and scene."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_the_estimate_follows_pages_samples_and_channels(tmp_path):
     plain = {"channels": "ao", "denoise": False}
     assert peak(resolution=1024, **plain) < peak(resolution=1024, denoise=False) < peak(resolution=1024)
     assert peak(resolution=1024, denoise=False) < peak(resolution=1024, denoise=False, samples=512)
-    # A unit square at 100 texels a metre has 10 000 texels, and a page of 64 x 64 holds 0.8 of its own.
+    # A unit square at 100 texels per metre has 10 000 texels. A page of 64 x 64 is estimated to be 80 % full.
     many = peak(resolution=64, density=100, **plain) - peak(resolution=64, **plain)
     one = peak(resolution=128, **plain) - peak(resolution=64, **plain)
     filled = 0.8 * 64**2

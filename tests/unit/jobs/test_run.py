@@ -1,4 +1,4 @@
-"""The order of work: slots, memory, threads, failures, locks; with an executor that bakes nothing."""
+"""`run_batch` with an executor that does not bake: order, slots, memory, threads, failures, locks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from baker.jobs.run import BatchOptions, batch_json, run_batch, write_junit
 
 
 class FakeExecutor:
-    """Ends jobs first in, first out; writes a file instead of a bake."""
+    """Finishes jobs in the order of their start. Makes an empty output folder instead of a bake."""
 
     def __init__(self, slots, failing=()):
         self.slots = slots

@@ -1,4 +1,4 @@
-"""What makes a finished bake stale, and what does not."""
+"""`check_output` decides whether a bake is up to date with scene, settings, versions and its files."""
 
 from __future__ import annotations
 

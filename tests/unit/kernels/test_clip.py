@@ -1,4 +1,4 @@
-"""Triangles cut by texels against polygons put together from their candidates."""
+"""Triangles clipped to texel squares, compared with polygons that are assembled from candidate corners."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def cut(corner, x0=0, y0=0):
 
 def random_triangles(n, rng):
     corner = rng.uniform(-1.5, 2.5, (n, 3, 2))
-    # A third are large, a third tiny.
+    # Make a third of the triangles large and a third small.
     corner[: n // 3] = corner[: n // 3] * 4 - 1.5
     corner[n // 3 : 2 * n // 3] = corner[n // 3 : 2 * n // 3, :1] + rng.normal(0, 0.2, (n // 3, 3, 2))
     return corner
@@ -37,7 +37,7 @@ def test_areas_are_those_of_the_polygons():
         polygon = naive.cut_polygon(corner, x0, y0)
         assert polygon_area(out, n) == pytest.approx(naive.shoelace(polygon)[0], abs=1e-12)
         if naive.shoelace(polygon)[0] > 1e-9:
-            # The same corners, relative to the square.
+            # Both polygons have the same corners; those of `out` are relative to the square.
             ours = out[:n] + np.array((x0, y0))
             assert all(np.linalg.norm(polygon - c, axis=1).min() < 1e-9 for c in ours)
             assert all(np.linalg.norm(ours - c, axis=1).min() < 1e-9 for c in polygon)
@@ -75,7 +75,7 @@ def test_touching_is_what_the_area_says():
         low, high = corner.min(axis=0), corner.max(axis=0)
         in_box = (low <= [x0 + 1, y0 + 1]).all() and (high >= [x0, y0]).all()
         area = naive.cut_area(corner, x0, y0)
-        # The caller has looked at the bounding box already; the edges are looked at here.
+        # `square_touches` tests the edges only. Its caller tests the bounding box first.
         assert bool(how and in_box) == (area > 0)
         assert (how == 2) == (area > 1 - 1e-12)
         seen[how] += 1
@@ -86,7 +86,7 @@ def test_a_triangle_without_area_touches_along_its_line_only():
     line = np.array([[0.5, 0.5], [3.5, 3.5], [2.0, 2.0]])
     for turn in (line, line[::-1], line[[1, 2, 0]]):
         touched = {(x, y) for x in range(4) for y in range(4) if square_touches(turn, x, y)}
-        # The corners that the line passes through belong to both squares beside it.
+        # The line passes through corners of squares, so it also touches the two squares beside each corner.
         assert touched == {(x, y) for x in range(4) for y in range(4) if abs(x - y) <= 1}
     assert square_touches(np.full((3, 2), 0.3), 0, 0) == 1
 
@@ -118,7 +118,7 @@ def test_points_of_what_is_no_polygon():
     assert polygon_point(out, 0, 0.5, 0.5) == (0, 0)
     assert polygon_point(out, 1, 0.5, 0.5) == (0.2, 0.2)
     assert polygon_point(out, 2, 0.5, 0.5) == pytest.approx((0.4, 0.3))
-    # On a line every number gives a point of the line.
+    # The polygon is degenerate, a line. All random numbers give points on the line.
     for u in (0.0, 0.5, 1.0):
         x, y = polygon_point(out, 3, u, 0.7)
         assert 0.2 <= x <= 0.6

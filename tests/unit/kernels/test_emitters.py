@@ -1,4 +1,4 @@
-"""Sampling of emissive triangles against its own density, and both halves of MIS against each other."""
+"""Sampling of emissive triangles matches its density, and both MIS estimates sum to the integrand."""
 
 from __future__ import annotations
 
@@ -32,7 +32,10 @@ emitter_hit, mis_weighted, sample_emitter = compiled(emitter_hit, mis_weighted, 
 
 
 def random_emitters(n, seed, two_sided=0.2):
-    """A bumpy sheet of n triangles of very different size and radiance, some two-sided, some dark."""
+    """Return (geometry, shading, emitters) of n random triangles that face down.
+
+    Size and radiance vary by orders of magnitude. Some triangles are two-sided, and some do not emit.
+    """
     rng = np.random.default_rng(seed)
     middle = rng.uniform(-2, 2, (n, 1, 3)) * [1, 0.1, 1]
     position = np.float32(
@@ -80,7 +83,7 @@ def random_emitters(n, seed, two_sided=0.2):
 
 def chances(emitters, centre, radius):
     chance, running = np.zeros((2, len(emitters.power)), np.float32)
-    # Two points whose box has this centre and half diagonal.
+    # Two ray origins: their bounding box has this centre, and half of its diagonal is `radius`.
     reach = np.full(3, radius / np.sqrt(3.0))
     origin = np.float32([[centre - reach, centre + reach]])
     cluster_chances(emitters, origin, chance, running)
@@ -209,7 +212,11 @@ def test_a_sphere_around_points():
 
 
 def test_the_two_halves_of_mis_make_one_whole():
-    """n_l p_l w_l + n_h p_h w_h is the integrand for every direction."""
+    """For each direction, n_l p_l w_l + n_h p_h w_h is the integrand, here the cosine.
+
+    n is the number of samples, p their density per solid angle, and w the MIS-weighted integrand, of light
+    samples (l) and of hemisphere samples (h).
+    """
     world = quad_world(
         [
             Quad((0, 1, 0), (1, 0, 0), (0, 0, 1), grey(0.5, 3.0)),
@@ -251,7 +258,7 @@ def test_the_two_halves_of_mis_make_one_whole():
         dark += not lit
         if not lit:
             continue
-        # The density is one over solid angle, written out.
+        # The density of light samples per solid angle.
         c = int(emitters.row[m, CLUSTER])
         density = chance[c] * emitters.row[m, SHARE] / world.geometry.area[t] * distance**2 / abs(facing)
         light = mis_weighted(cosine, float(density), float(n_light), float(n_hemisphere))
@@ -271,7 +278,7 @@ def test_textured_emission():
     world = quad_world(
         [Quad((0, 0, 0), (1, 0, 0), (0, 1, 0), picture), Quad((0, 0, 1), (1, 0, 0), (0, 1, 0), black)]
     )
-    # Black pictures do not emit; the table's power is the mean over the picture.
+    # A quad with a black texture is not an emitter. Power is proportional to the mean of the texture.
     np.testing.assert_array_equal(np.unique(world.emitters.triangle), [0, 1])
     truth = np.pi * 0.5 * 4 * (1 + 0.5) / 3
     assert world.emitters.power.sum() == pytest.approx(truth, rel=1e-6)

@@ -1,4 +1,4 @@
-"""Every map from random numbers, by chi-square against its density, and the nets by counting cells."""
+"""Sampling functions match their densities (chi-square tests), and Sobol points form (0, m, 2)-nets."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ EDGES = np.float32([0.0, 2**-24, 0.25, 0.5, 0.5 + 2**-24, 0.75, 1 - 2**-24])
 
 
 def texel_numbers(net, texel, mask, salt=25):
-    """Return (len(texel), n, 2) float32: the numbers that texels see, as kernels make them."""
+    """Return (len(texel), n, 2) float32: the n samples of `net`, scrambled for each texel as in kernels."""
     out = np.zeros((len(texel), len(net), 2), np.float32)
     seeds = np.zeros(32, np.uint32)
     for i, number in enumerate(texel):
@@ -59,11 +59,12 @@ def test_bits():
         assert int(scramble_reversed(x, seed)) == naive.owen_hash(int(x), int(seed))
     low = rng.integers(0, 2**32, 50, dtype=np.uint32)
     for k in (1, 5, 16, 31):
-        # A nested scramble: bits up to k depend on bits up to k only, and no two inputs fall together.
+        # The scrambling is nested: the lower k bits of the result depend on the lower k bits of the input.
         flipped = low ^ np.uint32(rng.integers(0, 2 ** (32 - k)) << k)
         for a, b in zip(low, flipped, strict=True):
             seed = np.uint32(12345)
             assert (int(scramble_reversed(a, seed)) ^ int(scramble_reversed(b, seed))) % 2**k == 0
+    # The scrambling permutes the lower 10 bits.
     assert sorted(int(scramble_reversed(np.uint32(i), np.uint32(77))) % 1024 for i in range(1024)) == list(
         range(1024)
     )
@@ -79,7 +80,7 @@ def test_hashes_spread():
 
 
 def assert_net(number, m):
-    """Every dyadic box of area 2^-m holds exactly one of 2^m points."""
+    """Assert that each dyadic box of area 2^-m contains exactly one of the 2^m points `number`."""
     number = np.asarray(number, float)
     assert number.shape == (2**m, 2)
     for k in range(m + 1):
@@ -96,7 +97,7 @@ def test_sequences_are_nets_for_every_texel(seed, pair):
         for chosen in (NO_BITS, mask):
             for numbers in texel_numbers(sequence[: 2**m], [0, 1, 70000], chosen):
                 assert_net(numbers, m)
-    # Every aligned run of a sequence is a net too: adding rays never spoils the spread.
+    # Each aligned block of 2^m points of a sequence is a net, too.
     for m in (4, 6):
         numbers = texel_numbers(sequence, [3], shared_bits_mask(2**m))[0]
         for start in range(0, 512, 2**m):
@@ -104,7 +105,7 @@ def test_sequences_are_nets_for_every_texel(seed, pair):
 
 
 def test_sequences_differ_by_seed_and_stage():
-    """One scramble may resemble another by chance (a coin a bit); over many seeds nothing is left of it."""
+    """Sequences of two seeds may be correlated by chance. The mean correlation of 400 seeds is zero."""
     np.testing.assert_array_equal(sobol_reversed(64, 3, 5), sobol_reversed(64, 3, 5))
     numbers = np.array([[sobol_reversed(64, seed, pair) for pair in (5, 6)] for seed in range(400)])
     assert len(np.unique(numbers.reshape(-1, 128), axis=0)) == 800
@@ -140,10 +141,10 @@ def test_a_sample_is_uniform_over_texels(shared):
     mask = shared_bits_mask(n) if shared else NO_BITS
     numbers = texel_numbers(net, np.arange(2600), mask).astype(float)
     if shared:
-        # Inside the shared cell.
+        # Position within the cell of the 8 x 8 grid that all texels share.
         numbers = numbers * 8 % 1
     tables = [uniform_table(*numbers[:, s].T, 8) for s in range(len(net))]
-    # Neighbours in the list are independent.
+    # Samples of different texels are independent.
     for step in (1, 2, 16):
         for s in (0, 7):
             for a in range(2):
@@ -165,11 +166,11 @@ def test_numbers_stay_below_one():
 def test_cosine_directions_are_cosine_weighted():
     point = np.random.default_rng(1).random((100_000, 2), np.float32)
     direction = cosine_directions(point).astype(float)
-    # Uniform on the disc: radius squared and angle are uniform and independent.
+    # The projection to the disc is uniform, so squared radius and angle are uniform and independent.
     square = 1 - direction[:, 2] ** 2
     angle = np.arctan2(direction[:, 1], direction[:, 0]) / (2 * np.pi) % 1
     naive.assert_uniform([uniform_table(square, angle, 16), uniform_table(square, angle, (2, 64))])
-    # E(z) = 2/3, variance 1/2 - 4/9 = 1/18; x and y have mean 0, variance 1/4.
+    # z has the mean 2/3 and the variance 1/2 - 4/9 = 1/18. x and y have the mean 0 and the variance 1/4.
     n = len(point)
     assert abs(direction[:, 2].mean() - 2 / 3) < 4 * np.sqrt(1 / 18 / n)
     assert np.abs(direction[:, :2].mean(axis=0)).max() < 4 * np.sqrt(1 / 4 / n)
@@ -183,7 +184,7 @@ def test_cosine_direction_is_the_concentric_map():
     direction = cosine_directions(point)
     truth = np.array([naive.cosine_direction(float(u), float(v)) for u, v in point])
     np.testing.assert_allclose(direction[:, :2], truth[:, :2], atol=5e-7)
-    # Near the horizon z is the root of a rounded difference: z squared is what can be held to rounding.
+    # z is the square root of a rounded difference. Near the horizon z is inaccurate, but z squared is not.
     np.testing.assert_allclose(direction[:, 2] ** 2, truth[:, 2] ** 2, atol=5e-7)
     assert (direction[:, 2] >= 0).all()
     np.testing.assert_allclose(np.linalg.norm(direction.astype(float), axis=1), 1, atol=5e-7)
@@ -194,7 +195,7 @@ def test_cosine_direction_is_the_concentric_map():
 def test_barycentrics_are_uniform():
     point = np.random.default_rng(4).random((60_000, 2), np.float32)
     b1, b2 = np.array([triangle_barycentric(u, v) for u, v in point], float).T
-    # P(b1 + b2 < s) = s^2, and the ratio is uniform: two independent uniform numbers.
+    # P(b1 + b2 < s) = s^2, so (b1 + b2)^2 is uniform. b1 / (b1 + b2) is uniform and independent of it.
     total = b1 + b2
     naive.assert_uniform([uniform_table(total**2, b1 / total, 16)])
     assert min(b1.min(), b2.min()) >= 0

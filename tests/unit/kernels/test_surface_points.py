@@ -1,4 +1,4 @@
-"""The points rays start from: uniform in what triangles take of a texel, on the right side."""
+"""Ray origins are uniform over the part of a texel that triangles cover, and offset to the correct side."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ def points(surface, chosen=None, mask=None, wanted=EVERY):
 
 @pytest.fixture(scope="module")
 def slanted():
-    """A parallelogram and a two-sided square, off the texel grid."""
+    """Return (geometry, texels, surface) of a parallelogram and a two-sided square, off the texel grid."""
     quads = [
         Quad((0, 0, 0), (1, 0, 0), (0.4, 0.9, 0)),
         Quad((3, 0, 0), (0, 0, 1), (0, 1, 0), grey(double_sided=True)),
     ]
     world = quad_world(quads, 16, inset=0.37)
-    # The uv of the first quad is a slanted shape too.
+    # In uv, the first quad is an irregular quadrilateral.
     uv = world.geometry.uv.copy()
     uv[:4] += np.float32([[0, 0], [-0.05, 0.06], [-0.01, -0.08], [0.09, 0.01]])
     world.geometry.uv[:] = uv
@@ -58,7 +58,7 @@ def slanted():
 
 
 def in_page(geometry, hit, bary):
-    """Return the page coordinates of points, in units of the page."""
+    """Return the uv (0 to 1) of points with the barycentrics `bary` on the triangles `hit`."""
     corner = geometry.uv[geometry.triangle[hit]].astype(float)
     b1, b2 = bary[..., :1].astype(float), bary[..., 1:].astype(float)
     return corner[..., 0, :] * (1 - b1 - b2) + corner[..., 1, :] * b1 + corner[..., 2, :] * b2
@@ -76,7 +76,7 @@ def test_points_lie_in_their_texel_and_triangle(slanted):
     for i in range(texels.n):
         f = surface.front[i]
         assert set(hit[i]) <= set(texels.entry[texels.first[f] : texels.first[f + 1]].tolist())
-    # On a flat surface: the barycentric position, moved off along the side's normal.
+    # On a flat surface, an origin is the barycentric position, offset along the normal of its side.
     corner = geometry.position[geometry.triangle[hit]].astype(float)
     b1, b2 = bary[..., :1], bary[..., 1:]
     flat = corner[..., 0, :] * (1 - b1 - b2) + corner[..., 1, :] * b1 + corner[..., 2, :] * b2
@@ -86,7 +86,8 @@ def test_points_lie_in_their_texel_and_triangle(slanted):
     away = np.maximum(
         ROUNDING * np.maximum(far, size), OFFSET * np.minimum(np.maximum(far, surface.min_offset_scale), size)
     )[..., None]
-    # Near the border also along the face: no rounding puts a point of it behind the wall beside it.
+    # Near an edge, the origin is also moved towards the triangle's middle. Otherwise rounding might put it
+    # behind an adjacent wall.
     clipped = np.clip(np.concatenate([1 - b1 - b2, b1, b2], axis=2), 0, 1)
     near = clipped.min(axis=2, keepdims=True) < BORDER
     assert near.any()
@@ -122,7 +123,7 @@ def test_points_are_uniform_in_what_is_covered(slanted):
                 [naive.cut_area(corner, x0 + a / 5, y0 + b / 5, 0.2) for b in range(5)] for a in range(5)
             ]
         assert area.sum() == pytest.approx(coverage[i], abs=1e-5)
-        # Points on the border of an empty cell, by rounding, count as the neighbour's.
+        # By rounding, a few points may lie just inside an empty cell. They are left out.
         assert table[area < 1e-7].sum() <= 2
         table[area < 1e-7], area[area < 1e-7] = 0, 0
         chance.append(naive.chi_square_chance(table, area / area.sum() * table.sum()))
@@ -131,7 +132,7 @@ def test_points_are_uniform_in_what_is_covered(slanted):
 
 def test_areas_and_centroids(slanted):
     geometry, texels, _ = slanted
-    # Every square metre lies in one texel, and backs are as large as fronts.
+    # The areas of an object's texels sum to its area, and a back has the same area as its front.
     for k, area in ((0, 0.9), (1, 1.0)):
         own = texels.instance[: texels.n_front] == k
         assert texels.area[: texels.n_front][own].sum() == pytest.approx(area, rel=1e-5)
@@ -186,18 +187,18 @@ def place_one(position, normal, b1, b2, flip=False):
 
 
 def test_a_rounded_facet_is_lifted_to_the_curve():
-    """Three points of a sphere: the middle of the facet is lifted towards the sphere, corners stay."""
+    """On a facet with the vertex normals of a sphere, the middle moves towards the sphere, corners stay."""
     corner = np.array([[0.3, 0.0, 1.0], [-0.2, 0.3, 1.0], [-0.2, -0.3, 1.0]])
     corner /= np.linalg.norm(corner, axis=1, keepdims=True)
     middle = corner.mean(axis=0)
     origin, normal = place_one(corner, corner, 1 / 3, 1 / 3)
-    # Hanika: the mean of the projections onto the tangent planes at the corners.
+    # Hanika 2021: at the centroid, the result is the mean of the projections onto the three tangent planes.
     planes = [middle - min((middle - c) @ c, 0) * c for c in corner]
     np.testing.assert_allclose(origin, np.mean(planes, axis=0), atol=2e-5)
     assert np.linalg.norm(middle) < 1 < np.linalg.norm(origin) < 1.05
     np.testing.assert_allclose(normal, middle / np.linalg.norm(middle), atol=1e-5)
     np.testing.assert_allclose(place_one(corner, corner, 0, 0)[0], corner[0], atol=2e-5)
-    # The back of the facet, and corners whose normals lean away too far, are not lifted.
+    # Points on the back are not moved, nor are points whose vertex normals deviate too far from the face.
     np.testing.assert_allclose(place_one(corner, corner, 1 / 3, 1 / 3, flip=True)[0], middle, atol=2e-5)
     leaning = np.tile([[0.9, 0.0, 0.43589]], (3, 1))
     np.testing.assert_allclose(place_one(corner, leaning, 1 / 3, 1 / 3)[0], middle, atol=2e-5)
@@ -208,7 +209,7 @@ def test_normals_that_make_no_sense_give_the_face_normal():
     for normal in (np.zeros((3, 3)), np.tile([0, 0, -1], (3, 1)), [[1, 0, 0], [-1, 0, 0], [0, 0, 0]]):
         np.testing.assert_allclose(place_one(corner, normal, 0.2, 0.3)[1], [0, 0, 1])
         np.testing.assert_allclose(place_one(corner, normal, 0.2, 0.3, flip=True)[1], [0, 0, -1])
-    # Barycentrics outside, by rounding, are pulled in, and a little more towards the middle.
+    # Barycentrics outside of the triangle are clamped, and the point is moved towards the middle.
     spot = place_one(corner, np.tile([0, 0, 1], (3, 1)), 1.1, -0.1)[0]
     step = 1e-5 * INWARD * np.array([-2.0, 1.0]) / 5**0.5
     np.testing.assert_allclose(spot, [1 + step[0], step[1], 1e-5], atol=1e-6)
@@ -227,7 +228,7 @@ def test_a_point_inside_geometry_is_replaced_by_a_valid_one(slanted):
     for n, i in enumerate(chosen):
         good = [k for k in range(N_POINTS) if int(mask[i]) >> k & 1] or list(range(N_POINTS))
         for w, k in enumerate(wanted[n]):
-            # Bad points take good ones in turn, so that each serves about equally often.
+            # Invalid points are replaced by valid ones in turn, so that these are used about equally often.
             truth = int(k) if k in good else good[k % len(good)]
             assert valid_point(mask[i], k) == truth
             for mine, every in zip(ours, free, strict=True):

@@ -1,4 +1,4 @@
-"""Texture lookups and texel albedo against plain loops over pixels."""
+"""Texture lookups and the albedo of texels, compared with Python loops over pixels."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_bytes_are_decoded_before_they_are_averaged():
     pack = pack_textures([PackImage(image, ("repeat", "repeat"))])
     grey = float(linear_from_srgb(128 / 255))
     np.testing.assert_allclose(lookup(pack, 0, 0.25, 0.25), [1, 0, grey, 64 / 255], atol=1e-6)
-    # The mean of black and white light is 0.5, which sRGB would have made 0.21.
+    # The mean of linear 0 and 1 is 0.5. The mean of the sRGB codes would decode to 0.21.
     np.testing.assert_allclose(lookup(pack, 0, 0.5, 0.5, 1.0), [0.5, 0, grey / 2, 32 / 255], atol=1e-6)
     assert pack_textures([]).pixels.shape == (1, 4)
 
@@ -106,7 +106,11 @@ def test_each_texture_of_a_pack_has_its_own_texels():
 
 @pytest.fixture(scope="module")
 def painted():
-    """Textures with a transform, mirrored and repeated; vertex colours; a plain quad."""
+    """Return (world, quads, (noise, ramp, turn)) of four quads.
+
+    Quad 0 has a noise texture with the transform `turn` and wrap modes, quad 1 a linear ramp as texture,
+    quad 2 vertex colours, and quad 3 a constant colour.
+    """
     rng = np.random.default_rng(3)
     noise = rng.integers(0, 256, (13, 9, 4)).astype(np.uint8)
     ramp = np.ones((64, 64, 4), np.float32)
@@ -156,7 +160,7 @@ def test_albedo_is_the_mean_over_the_points(painted):
             if k < 2:
                 u, v = transform[k] @ [*(share @ mesh.texcoord[0][source]), 1.0]
                 image_area = abs(np.linalg.det(transform[k][:, :2]))
-                # A quad takes 10.4 x 10.4 texels; each of 16 points represents a sixteenth of a texel.
+                # A quad covers 10.4 x 10.4 texels, and each of the 16 points represents 1/16 of a texel.
                 footprint = np.sqrt(image_area / 10.4**2 / N_POINTS)
                 width = max(levels[k][0].shape[:2])
                 n = int(np.floor(np.log2(max(footprint * width, 1)) + 0.5))
@@ -171,13 +175,14 @@ def test_albedo_is_the_mean_over_the_area(painted):
     world, quads, _ = painted
     texels = world.texels
     own = np.flatnonzero(texels.instance[: texels.n_front] == 1)
-    # A ramp from 0 to 1: the mean over a texel is the ramp at its centroid, up to the 16 strata.
+    # The mean of a linear ramp over a texel is the ramp's value at the centroid. The tolerance is needed
+    # because the albedo is a mean over 16 points only.
     ramp = texels.position[own, :2] - [2, 0]
     inner = (np.abs(ramp - 0.5) < 0.4).all(axis=1)
     assert inner.sum() > 40
     np.testing.assert_allclose(texels.albedo[own][inner][:, :2], ramp[inner], atol=0.02)
-    # Over all texels of the quads: the mean over the surface.
-    # Two triangles share the diagonal from corner 0 to corner 2: these corners count twice.
+    # The area-weighted mean over all texels of a quad is the mean over the quad. Corners 0 and 2 belong to
+    # both triangles, so their vertex colours have twice the weight.
     colours = np.array(quads[2].colour)[[0, 0, 1, 2, 2, 3], :3].mean(axis=0) * [0.5, 1, 1]
     for k, truth in ((1, [0.5, 0.5, 1.0]), (2, colours)):
         own = texels.instance[: texels.n_front] == k

@@ -1,4 +1,4 @@
-"""What lies at a hit, against a lookup written out."""
+"""The lookup from a hit to a lightmap pixel, compared with a reference function in Python."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_hits_find_the_texel_that_lies_there():
         front = bool(rng.random() < 0.6)
         truth = naive.hit_pixel(corner, geometry.page, geometry.double_sided, 20, 1, t, b1, b2, front)
         ours = hit_pixel(table.row, table.size, table.n_pixels, t, b1, b2, front)
-        # Rounding may put a point of a texel's border on its other side.
+        # By rounding, a point on the border between two texels may be assigned to either texel.
         if ours != truth:
             where = ((1 - b1 - b2) * corner[t, 0] + b1 * corner[t, 1] + b2 * corner[t, 2]) * 20
             assert np.abs(where - np.rint(where)).min() < 1e-4
@@ -42,7 +42,7 @@ def test_hits_find_the_texel_that_lies_there():
             found["black"] += 1
             continue
         found["front" if front else "back"] += 1
-        # On either side of a border the texel found is the surface's own.
+        # In both cases, the texel belongs to the hit object and side.
         entry = entry_at[ours]
         assert 0 <= entry < texels.n
         assert texels.instance[entry] == geometry.instance[t]
@@ -91,7 +91,7 @@ def test_pixels_beside_a_chart_know_its_texels():
 
 
 def test_two_sides_without_a_texel_are_looked_up_nowhere():
-    """A two-sided sliver that owns no texel must not make hits reach behind the image of the fronts."""
+    """If no two-sided triangle has texels, there are no entries of backs, and lookups must not read them."""
     from baker.radiosity.triangle_lookup import build_triangle_lookup
 
     world = quad_world([Quad((0, 0, 0), (1, 0, 0), (0, 1, 0)), Quad((2, 0, 0), (1, 0, 0), (0, 1, 0))], 16)

@@ -1,4 +1,4 @@
-"""Emissive textures of many repeats: bounded work, and the power that all of it would have found."""
+"""Emissive textures with many repeats: the work is limited, and the power is that without a limit."""
 
 from __future__ import annotations
 
@@ -25,7 +25,10 @@ def sparks(*size):
 
 @pytest.fixture
 def calls(monkeypatch):
-    """Texel lines that the edges of triangles cross, and the number of triangles, of each kernel call."""
+    """Return a list that gets one tuple for each kernel call.
+
+    The tuple has the number of texel lines that the edges of triangles cross, and the number of triangles.
+    """
     found = []
     real = emissive_texture.uv_means
 
@@ -40,7 +43,7 @@ def calls(monkeypatch):
 def check_work(calls):
     crossed, triangles = np.array(calls).sum(axis=0)
     assert 0 < crossed <= MOST_CROSSED + FEW_CROSSED * triangles
-    # Between two calls the work can be interrupted.
+    # Each call is short, because signals are handled between calls.
     assert max(c for c, _ in calls) < 0.3 * MOST_CROSSED
 
 
@@ -55,7 +58,7 @@ def test_many_quads_with_many_repeats(calls):
     check_work(calls)
     power = np.pi * 225 * 0.15**2 * image[..., :3].mean(dtype=float)
     assert emitters.power.sum() == pytest.approx(power, rel=1e-3)
-    # Each quad's own power is right, too.
+    # The power of each single quad is correct, too.
     share = emitters.row[:, SHARE] * emitters.power[emitters.row[:, CLUSTER].astype(int)]
     own = np.bincount(emitters.triangle // 2, share, 225)
     np.testing.assert_allclose(own, power / 225, rtol=1e-2)
@@ -67,7 +70,7 @@ def test_many_quads_with_many_repeats(calls):
     [
         ((3e4, 3e4), (256, 256), ("repeat", "mirror")),
         ((1e20, 1.0), (37, 101), ("repeat", "repeat")),
-        # Only some rows of the texture are seen: that axis keeps its resolution.
+        # v covers only some rows of the texture, so the resolution along v is not reduced.
         ((1e5, 0.3), (37, 101), ("repeat", "clamp")),
         ((0.3, 1e6), (37, 101), ("mirror", "repeat")),
     ],
@@ -80,7 +83,7 @@ def test_one_quad_with_very_many_repeats(calls, repeats, size, wrap, nearest):
         parts = cut(textures, np.ones(2), np.zeros(2), most)
         return parts.inside[:, 2] ** 2 @ parts.mean
 
-    # Two whole repeats look the same as any even number.
+    # 2 repeats have the same mean as any even number of repeats.
     truth = power(np.where(np.array(repeats) > 2, 2.0, repeats), 0)
     calls.clear()
     np.testing.assert_allclose(power(repeats, MOST_PARTS), truth, rtol=1e-3)

@@ -1,4 +1,4 @@
-"""Textured emitters in parts: what is hit is what is aimed at, and no light is lost on the way."""
+"""Parts of textured emitters: hits and samples find the same part, and the total power is preserved."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def one_texel(n=64, row=50, column=5):
 
 
 def blobs(n=48):
-    """Round spots of several colours and a faint ground."""
+    """Return an (n, n, 3) image of round spots in several colours on a dark background."""
     rng = np.random.default_rng(3)
     y, x = np.mgrid[:n, :n] + 0.5
     image = np.full((n, n, 3), 0.002, np.float32)
@@ -51,7 +51,7 @@ def blobs(n=48):
 
 
 def plate(material, far=0.0):
-    """A plate of 2 x 1 m that shines down, and something far away that makes the scene large."""
+    """Return the world of an emitting plate of 2 x 1 m and of a quad at x = `far`, which makes it large."""
     quads = [Quad((0, 1, 0), (2, 0, 0), (0, 0, 1), material)]
     return quad_world([*quads, Quad((far, -3, 0), (1, 0, 0), (0, 0, -1), grey(0.5))])
 
@@ -85,7 +85,7 @@ def test_a_hit_finds_the_part_that_is_there(image, far):
             holds = own[(u >= -1e-6) & (v >= -1e-6) & (u + v <= 1 + 1e-6)]
             emitted_radiance(world.shading, t, b1, b2, out)
             if m < 0:
-                # Black parts are black all over.
+                # No part is stored where the texture is black.
                 assert not out[:3].any()
                 assert len(holds) <= 2
             else:
@@ -95,7 +95,7 @@ def test_a_hit_finds_the_part_that_is_there(image, far):
                 if emitters.row[m, TEXTURED] == 0 and emitters.row[m, INSIDE + 2] ** 2 > 0.01:
                     np.testing.assert_allclose(emitters.row[m, RADIANCE : RADIANCE + 3], out[:3], rtol=0.01)
     assert seen > 3
-    # Nothing is looked up where parts are constant: kernels need no textures then.
+    # If the radiance of all parts is constant, kernels read no textures.
     if (emitters.row[:, TEXTURED] == 0).all():
         assert needed_shading(emitters, world.shading) is None
 
@@ -106,7 +106,7 @@ def test_parts_do_not_overlap_and_leave_out_what_is_black():
     assert whole[emitters.triangle == 0].sum() == pytest.approx(1.0, abs=1e-6)
     np.testing.assert_allclose(emitters.row[:, AREA], whole, rtol=1e-5)
     lit = plate(emissive(one_texel())).emitters.row
-    # A bilinear texel reaches over a part of three by three, which is how closely parts follow it.
+    # With bilinear lookup, one lit texel lights an area of 2 x 2 texels. Parts cover at most 3 x 3 texels.
     assert 4 / 4096 <= lit[:, AREA].sum() / 2 <= 9 / 4096
 
 
@@ -119,7 +119,7 @@ def test_sampled_points_lie_where_their_density_says():
     for u, v in rng.random((n, 2), np.float32):
         m, density, b1, b2 = sample_emitter(*choice, u, v, point)
         a1, a2 = on_triangle(chosen.row, m, b1, b2)
-        # On a part's edge it may be either side.
+        # A point on the edge between two parts may be assigned to either part.
         if min(b1, b2, 1 - b1 - b2) > 1e-4:
             assert emitter_at(chosen.node, int(world.emitters.root[chosen.triangle[m]]), a1, a2) == m
         corner = world.geometry.position[world.geometry.triangle[chosen.triangle[m]]].astype(float)
@@ -133,7 +133,7 @@ def test_sampled_points_lie_where_their_density_says():
 
 
 def test_a_palette_texture_costs_nothing():
-    """All corners in one colour's cell: one row a triangle, which shines with that colour."""
+    """If all uv are equal, each triangle is a single part with the constant radiance of one texel."""
     image = blobs(8)
     world = plate(emissive(image))
     shading = world.shading._replace(emission_uv=np.full_like(world.shading.emission_uv, 3.5 / 8))
@@ -154,7 +154,7 @@ def test_a_dim_emitter_is_cut_as_finely_beside_a_bright_one():
 
 
 def test_more_lit_texels_than_parts_keep_their_power():
-    """Two hundred repeats of a texture with one lit texel of 64 x 64: parts shine with their means."""
+    """200 repeats of a texture with one lit texel of 64 x 64 exceed the limit. Parts have mean radiance."""
     image = one_texel()
     world = plate(emissive(image, (8.0,) * 3))
     shading = world.shading._replace(emission_uv=world.shading.emission_uv * np.float32(200))

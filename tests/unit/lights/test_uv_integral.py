@@ -1,4 +1,4 @@
-"""Means of textures over uv triangles against clipping the triangle at each texel."""
+"""Means of textures over uv triangles, compared with clipping the triangle to each texel."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def picture(size, seed=0, lit=0.5):
 
 
 def means(image, wrap, nearest, uv, weight=(1.0, 1.0, 1.0)):
-    """Return what the kernel makes of triangles (n, 3, 2): means (n, 3), spread (n,)."""
+    """Return the results of `uv_means` for the uv triangles `uv` (n, 3, 2): mean (n, 3), spread (n,)."""
     pack = pack_textures([PackImage(image, wrap, nearest)])
     pixels, w, h, sums = finest_level(pack, 0, np.array(weight))
     mean, spread = np.zeros((len(uv), 3)), np.zeros(len(uv))
@@ -41,7 +41,7 @@ def wrapped(i, n, mode):
 
 
 def cut_off(corners, axis, bound, sign):
-    """Keep of a polygon what has sign * (x - bound) >= 0 along an axis."""
+    """Return the part of a polygon in which sign * (x[axis] - bound) >= 0."""
     out = []
     for p, q in zip(corners, [*corners[1:], *corners[:1]], strict=True):
         a, b = sign * (p[axis] - bound), sign * (q[axis] - bound)
@@ -53,7 +53,11 @@ def cut_off(corners, axis, bound, sign):
 
 
 def clipped_mean(image, wrap, nearest, uv):
-    """Mean and mean square, texel by texel: a triangle's three edge midpoints integrate what is quadratic."""
+    """Return the mean (3,) and the mean square of an image over a uv triangle.
+
+    The triangle is clipped to each texel, and the clipped polygon is divided into a fan of triangles. The
+    mean of a quadratic function over a triangle is the mean of its values at the edge midpoints.
+    """
     h, w = image.shape[:2]
     corner = uv * [w, h] - (0.0 if nearest else 0.5)
     total, squares, area = np.zeros(3), 0.0, 0.0
@@ -108,7 +112,7 @@ def test_both_triangles_of_a_rectangle_share_its_texels(nearest):
     square = np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], float)
     mean, _ = means(image, ("repeat", "repeat"), nearest, square)
     np.testing.assert_allclose(mean.mean(axis=0), image[..., :3].mean(axis=(0, 1)), rtol=1e-6)
-    # Turned by 45 degrees, over a whole number of repeats, or in the other order of corners: the same.
+    # The mean is the same for a square of whole repeats rotated by 45 degrees, and for reversed corners.
     turned = square @ np.array([[2.0, 2.0], [-2.0, 2.0]]) + 0.3
     np.testing.assert_allclose(
         means(image, ("repeat", "repeat"), nearest, turned)[0].mean(axis=0), mean.mean(axis=0), rtol=1e-9
@@ -118,7 +122,7 @@ def test_both_triangles_of_a_rectangle_share_its_texels(nearest):
 
 
 def test_uv_without_area():
-    """All corners at one place give that texel, corners on a line the mean along it."""
+    """For corners at one point, the mean is a lookup. For corners on a line, it is the line's mean."""
     image = picture((5, 8), lit=1.0)
     pack, out = pack_textures([PackImage(image, ("repeat", "clamp"))]), np.zeros(4)
     place = np.array([0.37, 0.61])
@@ -128,7 +132,7 @@ def test_uv_without_area():
     assert spread[0] == 0
     line = np.array([0.1, -0.3]) + np.array([[0.0], [1.7], [0.6]]) * [1.0, 0.7]
     flat, _ = means(image, ("repeat", "clamp"), False, line[None])
-    # A hair of width goes the other way through the code.
+    # A triangle with a tiny area is not handled as a line, but must give nearly the same mean.
     hair = np.array([[0, 0], [0, 0], [1e-5, -1e-5]])
     wide, _ = means(image, ("repeat", "clamp"), False, (line + hair)[None])
     np.testing.assert_allclose(flat, wide, rtol=1e-4)
@@ -139,7 +143,7 @@ def test_black_is_exactly_black():
     image = np.zeros((64, 70, 4), np.float32)
     image[20, 30, :3] = [0.3, 0.7, 0.1]
     rng = np.random.default_rng(2)
-    # Around the lit texel, and its bilinear reach, are places that share its row or column.
+    # Centres of triangles outside of the lit texel's bilinear support. Some are in its row or column.
     centre = np.array([[30.5, 24.5], [35.5, 20.5], [25.0, 15.0], [100.5, 50.0]]) / [70, 64]
     uv = centre[:, None] + rng.uniform(-1, 1, (4, 3, 2)) * 2.5 / np.array([70, 64])
     for nearest in (False, True):
@@ -180,7 +184,7 @@ def test_a_smaller_texture_keeps_mean_and_mean_square(size):
             spread,
         )
         np.testing.assert_allclose(mean.mean(axis=0), truth, rtol=1e-6)
-        # E[f^2] of each half from its spread and its mean.
+        # The mean square of a triangle is (1 + spread) times its squared mean.
         found = ((1 + spread) * (mean**2 @ weight)).mean()
         assert found == pytest.approx(squares, rel=1e-5)
 

@@ -42,7 +42,7 @@ def test_noise_floor_is_what_noise_alone_shows():
     found = error_metrics(
         truth, reference, standard_error=np.full(truth.shape, 0.02 / np.sqrt(2)), halves=halves
     )
-    # A map without any error shows exactly the floor.
+    # The measured error of an exact map equals the noise floor.
     assert found["median"] == pytest.approx(found["noise_floor"], rel=0.05)
     assert found["p95"] == pytest.approx(found["noise_p95"], rel=0.05)
     assert found["z_rms"] == pytest.approx(1.0, abs=0.05)
@@ -51,7 +51,7 @@ def test_noise_floor_is_what_noise_alone_shows():
 def test_energy_ratio_by_hand():
     value, truth = np.array([[1.0, 3.0], [4.0, 4.0]]), np.array([[1.0, 1.0], [5.0, 5.0]])
     found = error_metrics(value, truth, weight=np.array([3.0, 1.0]))
-    # Means over colours 2, 4 and 1, 5: (6 + 4) / (3 + 5).
+    # The means over colours are 2 and 4 (value) and 1 and 5 (truth): (3 * 2 + 4) / (3 * 1 + 5) = 10 / 8.
     assert found["energy_ratio"] == pytest.approx(1.25)
     assert found["energy_ratio_se"] == pytest.approx(np.hypot(3 * (2 - 1.25), 4 - 6.25) / 8)
     assert error_metrics(value, truth)["energy_ratio"] is None

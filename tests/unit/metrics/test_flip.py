@@ -1,4 +1,4 @@
-"""FLIP of simple pictures."""
+"""The FLIP error of simple images."""
 
 from __future__ import annotations
 

@@ -18,17 +18,18 @@ def points(value, reference, noise=0.0, samples=256):
 
 def noisy(rng, n, noise=0.05, colours=3):
     truth = np.exp(rng.normal(0, 0.5, (n, 1))) * rng.uniform(0.5, 1.5, colours)
-    # Paths' colours rise and fall together.
+    # The three colours of a path have the same noise.
     return truth, truth * (1 + noise * rng.standard_normal((n, 1)))
 
 
 def test_by_hand():
     found = compare_group(points([[2.0, 1.0, 0.0], [2.0, 1.0, 3.0]], [[1.0, 1.0, 1.0], [2.0, 2.0, 2.0]]), 2.0)
     assert (found.texels, found.light) == (2, 1.5)
-    # Means over colours 1, 2 and 1, 2; shares of the colours 4, 2, 3 thirds and 1, 1, 1.
+    # The means over colours are 1 and 2, for value and reference. The sums of the colours, relative to their
+    # mean, are 4/3, 2/3, 1 for the value, and 1, 1, 1 for the reference.
     assert found.bias == pytest.approx(0)
     np.testing.assert_allclose(found.colour, [1 / 3, -1 / 3, 0], atol=1e-12)
-    # Without the first place 0, without the second 0.
+    # The bias is 0 if either point is left out, so its jackknife standard error is 0.
     assert found.bias_se == pytest.approx(0)
 
 
@@ -40,7 +41,8 @@ def test_the_error_of_the_bias_is_its_spread():
         found.append(compare_group(points(1.02 * truth, reference), 1.0))
     assert np.mean([f.bias for f in found]) == pytest.approx(0.02, abs=0.002)
     assert np.std([f.bias for f in found]) == pytest.approx(np.mean([f.bias_se for f in found]), rel=0.15)
-    # What is sure is less than what is there, and nothing where nothing is: 3.6 standard errors.
+    # `sure_bias` is the bias reduced by 3.6 standard errors. It does not exceed the true bias, and is 0
+    # without a bias.
     assert sum(f.sure_bias > 0.02 for f in found) == 0
     exact = [compare_group(points(t, r), 1.0) for t, r in (noisy(rng, 50) for _ in range(400))]
     assert sum(f.sure_bias != 0 for f in exact) < 4
@@ -65,7 +67,7 @@ def test_one_bright_place_decides_nothing():
     found = compare_group(points(value, truth), 1.0)
     assert found.bias == pytest.approx(-0.19, abs=0.01)
     assert found.sure_bias == 0
-    # Nor do two like ones, between which nothing varies.
+    # Two bright points with the same deviation have no variance, but are not significant either.
     dark = np.full((30, 3), 1e-6)
     dark[:2] = 1.0
     two = compare_group(points(0.75 * dark, dark), 1.0)
@@ -80,7 +82,7 @@ def test_rare_light_in_one_half_of_the_reference_is_no_deviation():
     rng = np.random.default_rng(5)
     truth = np.ones((200, 3))
     halves = tuple(truth + 0.02 * rng.standard_normal((200, 1)) for _ in range(2))
-    # A red path in a hundred points, all in one half: between points nothing varies.
+    # One half has additional red light of rare paths. It is the same at all points.
     halves[0][:, 0] += 0.2
     reference = 0.5 * (halves[0] + halves[1])
     found = compare_group(
@@ -92,7 +94,7 @@ def test_rare_light_in_one_half_of_the_reference_is_no_deviation():
 
 def test_light_where_none_should_be():
     dark = np.zeros((20, 3))
-    # Fifty times what a path too few would explain.
+    # The value is about 40 times the light of one missed path.
     leak = compare_group(points(dark + 0.05, dark, samples=4096), 100.0)
     assert leak.bias == pytest.approx(0.05 / (1e-3 * 100))
     assert 0.4 < leak.sure_bias < leak.bias
@@ -120,7 +122,10 @@ def test_few_points_need_more():
 
 
 def halved(rng, light, noise):
-    """Return two halves of a reference of `light` (n,), each with sqrt(2) times the noise of their mean."""
+    """Return two halves (n, 1) of a reference with the light `light` (n,).
+
+    The mean of the halves has the relative standard error `noise` (n,), each half sqrt(2) times as much.
+    """
     return tuple(
         light[:, None] * (1 + math.sqrt(2) * noise[:, None] * rng.standard_normal((len(light), 1)))
         for _ in range(2)
@@ -147,7 +152,8 @@ def test_bright_and_dark_points_in_one_group_are_no_noise_of_the_map():
         )
         sure += found.sure_noise > 0
         apart += found.typical > 4 * found.typical_noise
-    # The medians are often far apart, though the map is exact: that of either may be the least dark error.
+    # Both medians are the smallest error among the 12 dark, noisy points. They often differ by more than a
+    # factor of 4, although the map is exact.
     assert apart > 30
     assert sure == 0
 

@@ -1,4 +1,4 @@
-"""What is seen of a map as a picture: levels, blur, dilation, texels that stand out."""
+"""Tests of a map as an image: few levels, clipping, blur, dilation, outliers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ALL = np.ones((1, SIZE, SIZE), bool)
 
 
 def hills(seed=0):
-    """A smooth map with a shadow edge and a percent of noise, as half floats hold it."""
+    """Return a smooth map (1, SIZE, SIZE, 3) with a shadow edge and 1 % noise, rounded to half precision."""
     rng = np.random.default_rng(seed)
     row, column = np.mgrid[:SIZE, :SIZE] / SIZE
     light = (
@@ -68,7 +68,7 @@ def test_blur():
     assert not is_blurred(page[None], ALL, steep, truth)
     for width in (1, 2):
         assert is_blurred(gaussian_filter(page, width)[None], ALL, steep, truth)
-    # A noisier map is no blurred one.
+    # A map with more noise does not count as blurred.
     rough = page * (1 + 0.1 * rng.standard_normal(page.shape))
     assert not is_blurred(rough[None], ALL, steep, truth)
 
@@ -87,7 +87,7 @@ def test_texels_that_stand_out():
     page[0, 70, 80:82] = 40.0
     found = outlier_texels(page, ALL, 2)
     np.testing.assert_array_equal(found, [20 * SIZE + 30, 50 * SIZE + 60])
-    # Two wrong neighbours mask each other; beside texels without value nothing is reported.
+    # Next to an empty texel the score is 1, no outlier. Two adjacent outliers hide each other.
     hole = ALL[0].copy()
     hole[21, 30] = False
     score = outlier_factor(page[0, ..., 0].astype(np.float64), hole)

@@ -31,7 +31,7 @@ def test_points_lie_in_their_texel_and_fill_it_evenly():
     size = round(np.sqrt(len(instance_map(geometry, 1, 32).reshape(-1))))
     pixel = np.flatnonzero(instance_map(geometry, 1, size).reshape(-1) == 0)
     found = surface_points(geometry, pixel, size, 64, 1)
-    # Quad 0 lies in the plane z = 0; its uv follows x and y.
+    # Quad 0 lies in the plane z = 0. `fit` (3, 2) maps (x, y, 1) to its uv.
     corner = geometry.triangle[geometry.instance == 0].reshape(-1)
     uv, position = geometry.uv[corner], geometry.position[corner]
     fit, *_ = np.linalg.lstsq(np.c_[position[:, :2], np.ones(len(position))], uv, rcond=None)
@@ -43,7 +43,7 @@ def test_points_lie_in_their_texel_and_fill_it_evenly():
     row, column = np.divmod(pixel, size)
     assert (np.abs(at[..., 0] - column[:, None] - 0.5) <= 0.5 + 1e-4).all()
     assert (np.abs(at[..., 1] - row[:, None] - 0.5) <= 0.5 + 1e-4).all()
-    # Off the 4 m wide triangle by a few of its float32 steps.
+    # The points are offset from the surface by `ROUNDING` times the triangle's size, 4 m.
     np.testing.assert_allclose(found.position[..., 2], 4 * ROUNDING, atol=1e-9)
     np.testing.assert_allclose(np.abs(found.normal[..., 2]), 1, atol=1e-6)
     whole = found.area > 0.999
@@ -64,7 +64,7 @@ def test_border_texels_are_looked_up_where_their_surface_is():
     half = (found.area > 0.2) & (found.area < 0.8)
     assert half.any()
     assert (np.abs(found.offset[half]).max(axis=1) > 0.1).all()
-    # A page that is linear in the page: a bilinear lookup gives its value at that very place.
+    # The page contains its own row and column coordinates, so a lookup returns the position of the lookup.
     row, column = np.mgrid[:size, :size]
     page = np.stack([row + 0.5, column + 0.5], axis=2)[None].astype(np.float32)
     inside = ((pixel % size) % (size - 1) > 0) & ((pixel // size) % (size - 1) > 0)
@@ -85,7 +85,7 @@ def test_every_object_and_every_brightness_is_chosen():
     assert abs(len(chosen) - 300) < 20
     assert count[1] >= 6
     assert count[2] >= 1
-    # Taken evenly over the order of brightness: the chosen ones' distribution is that of all.
+    # Texels are chosen at regular steps of their rank by light, so their distribution is that of all texels.
     mine, all_of = np.sort(light[chosen[owner[chosen] == 0]]), light[eligible & (owner == 0)]
     rank = np.searchsorted(np.sort(all_of), mine) / len(all_of)
     assert np.abs(rank - (np.arange(len(mine)) + 0.5) / len(mine)).max() < 0.01

@@ -54,7 +54,7 @@ def density_of(row, vx, vy, vz, way):
 
 
 def grid(n_cosine, n_angle, inner=16):
-    """Return directions (cells, inner^2, 3) that tile the hemisphere in cells of equal solid angle."""
+    """Return directions (cells, inner^2, 3) on the hemisphere, divided into cells of equal solid angle."""
     step = (np.arange(inner) + 0.5) / inner
     z = (np.arange(n_cosine)[:, None] + step) / n_cosine
     phi = 2 * np.pi * (np.arange(n_angle)[:, None] + step) / n_angle
@@ -74,8 +74,8 @@ def test_samples_follow_their_density(name, degrees):
     random = np.random.default_rng(3).random((200_000, 3))
     found = draw_many(row, *view, random)
     up = found[:, 2] > 0
-    # What a rough lobe sends below the surface is lost; with it the density integrates to 1, within three
-    # standard errors of the lost share and what the midpoint rule is good to.
+    # Samples of a rough lobe below the surface are lost. The integral of the density and the lost share sum to
+    # 1. The tolerance is three standard errors of the lost share, plus the error of the midpoint rule.
     lost = 1 - up.mean()
     assert mass.sum() + lost == pytest.approx(1, abs=3 * np.sqrt(lost * up.mean() / len(up)) + 2e-4)
     if name == "lambert":
@@ -84,7 +84,7 @@ def test_samples_follow_their_density(name, degrees):
     cell = np.minimum((z * 12).astype(int), 11) * 16 + np.minimum((phi / (2 * np.pi) * 16).astype(int), 15)
     count = np.bincount(cell, minlength=len(cells))
     expected = mass / mass.sum() * up.sum()
-    # Narrow lobes: the midpoint rule inside a cell is good to 0.3 % only.
+    # For narrow lobes, the midpoint rule in a cell has an error of up to 0.3 %.
     many = expected > 50
     chi = ((count - expected)[many] ** 2 / (expected + (0.003 * expected) ** 2)[many]).sum()
     assert chi < stats.chi2.isf(1e-4, many.sum())
@@ -117,12 +117,12 @@ def test_scattering_is_the_same_both_ways(name):
     ("material", "least", "most"),
     [
         (LAMBERT, 0.3333, 0.3334),
-        # A white smooth mirror loses nothing; a narrow lobe next to nothing.
+        # A white mirror loses no light, and a narrow lobe almost none.
         ((1, 1, 1, 1, 0.0), 0.9999, 1.0001),
         ((1, 1, 1, 1, 0.01), 0.99, 1.001),
-        # What bounces twice between the facets of a rough metal is missing: the model's known loss.
+        # The model ignores light reflected more than once between microfacets, so a rough metal loses light.
         ((1, 1, 1, 1, 1.0), 0.30, 0.99),
-        # A white rough dielectric: the share that F takes from the diffuse part and the lobe gives back.
+        # A white rough dielectric: the specular lobe has the share F that the diffuse part lacks.
         ((1, 1, 1, 0, 1.0), 0.9, 1.001),
     ],
 )
@@ -133,7 +133,8 @@ def test_white_furnace(material, degrees, least, most):
 
 
 def test_the_loss_of_the_roughest_metal_is_the_known_one():
-    # a = 1, seen from above: D = 1 / pi, V n.l = n.l / (2 (n.l + 1)), whose integral is 1 - ln 2.
+    # For a = 1 and a view along the normal, D = 1 / pi and V n.l = n.l / (2 (n.l + 1)). The integral of
+    # D V n.l over the hemisphere is 1 - ln 2.
     found = draw_many(column((1, 1, 1, 1, 1.0)), 0.0, 0.0, 1.0, np.random.default_rng(1).random((400_000, 3)))
     share = np.where(found[:, 2] > 0, found[:, 4], 0).mean()
     assert share == pytest.approx(1 - np.log(2), abs=0.002)

@@ -1,4 +1,4 @@
-"""Directions that ignore the material, and those through pixels: chi-square against their densities."""
+"""Scattering directions independent of the material, and camera rays, match their densities (chi-square)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def scatter_many(material, axis, hemisphere, random):
             path[NORMAL + a, 0] = axis[a]
             path[BETA + a, 0] = 1.0
         set_frame(path, 0, axis[0], axis[1], axis[2])
-        # Seen at an angle whose sine is 0.6.
+        # Direction to the viewer in the tangent frame, at an angle to the normal whose sine is 0.6.
         path[TO, 0], path[TO + 1, 0], path[TO + 2, 0] = 0.6, 0.0, 0.8
         if not scatter(path, row, 0, hemisphere, random[i, 0], random[i, 1], random[i, 2], weight):
             continue
@@ -43,7 +43,7 @@ def scatter_many(material, axis, hemisphere, random):
 
 
 def uniform(value, other):
-    """Check pairs of numbers that ought to be uniform in the unit square."""
+    """Assert that the pairs (value, other) are uniform in the unit square."""
     count = np.histogram2d(value, other, bins=16, range=[[0, 1], [0, 1]])[0]
     assert count.sum() == len(value)
     assert stats.chisquare(count.ravel()).pvalue > LEVEL
@@ -58,11 +58,11 @@ def test_directions_that_ignore_the_material(hemisphere):
     across = np.cross(AXIS, [0.0, 0.0, 1.0])
     across /= np.linalg.norm(across)
     phi = np.arctan2(way @ np.cross(AXIS, across), way @ across) / (2 * np.pi) + 0.5
-    # Uniform: heights are (Archimedes); by the cosine: their squares are (Malley).
+    # For uniform directions, z is uniform (Archimedes). For cosine-weighted ones, z squared is (Malley).
     uniform(z if hemisphere == 1 else z**2, phi)
     told = np.full(N, 0.5 / math.pi) if hemisphere == 1 else z / math.pi
     np.testing.assert_allclose(density, told, atol=1e-6)
-    # The density integrates to 1: by Gauss points over the height, of which it is a polynomial.
+    # The density is a polynomial of the height z, so Gauss-Legendre quadrature of its integral, 1, is exact.
     height, share = np.polynomial.legendre.leggauss(8)
     height = 0.5 + 0.5 * height
     over = 0.5 / math.pi + 0 * height if hemisphere == 1 else height / math.pi
@@ -71,7 +71,7 @@ def test_directions_that_ignore_the_material(hemisphere):
 
 @pytest.mark.parametrize("hemisphere", [0, 1, 2])
 def test_all_ways_to_scatter_carry_the_same_light(hemisphere):
-    """The mean throughput is the reflected share, whichever directions are drawn."""
+    """The mean throughput is the reflected share of light for all ways to sample directions."""
     n = 400
     z, phi = (np.arange(n) + 0.5) / n, 2 * np.pi * (np.arange(n) + 0.5) / n
     z, phi = (a.ravel() for a in np.meshgrid(z, phi))
@@ -86,7 +86,7 @@ def test_all_ways_to_scatter_carry_the_same_light(hemisphere):
     weight = found[:, 4:]
     error = weight.std(axis=0) / math.sqrt(len(weight))
     assert (3 * error < 0.005 * truth).all()
-    # Channels share their directions: one test.
+    # The three colours use the same directions, so this counts as one statistical test.
     assert (abs(weight.mean(axis=0) - truth) < 3 * error).all()
 
 
@@ -111,5 +111,5 @@ def test_pixels_are_covered_evenly():
         y = (1 - way[i] @ np.array(camera.up) / ahead / high) * 1.5 - pixel[i] // 4
         assert min(x.min(), y.min()) > -1e-6
         assert max(x.max(), y.max()) < 1 + 1e-6
-        # The lattice of a pass is even; what is random is its shift: one pair a pass.
+        # The 16 samples of a pass are a lattice with a random shift, so only one sample per pass is tested.
         uniform(np.clip(x[::16], 0, 1), np.clip(y[::16], 0, 1))

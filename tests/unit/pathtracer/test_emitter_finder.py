@@ -1,4 +1,4 @@
-"""The path tracer's emitters: against closed forms, against the bake's finder, and with parts missing."""
+"""The path tracer's emitter table, compared with closed forms and with the emitter table of the bake."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from baker.pathtracer.scene import build_reference
 
 
 def picture():
-    """Bright spots, black texels and a faint ground."""
+    """Return a (16, 16, 4) image of bright and black texels on a dark background."""
     rng = np.random.default_rng(3)
     image = np.full((16, 16, 4), 0.002, np.float32)
     image[4:6, 5:9, :3] = rng.random((2, 4, 3))
@@ -76,13 +76,13 @@ def test_parts_of_a_textured_triangle_have_its_power():
     size = emitters.row[:, EMITTER_PART + 2]
     np.testing.assert_allclose(emitters.row[:, EMITTER_AREA], size**2, rtol=1e-5)
     assert (emitters.row[:, EMITTER_TEXTURED] == 1).all()
-    # Black texels have no part.
+    # Black texels have no part, so the parts' area is smaller than the quad's area of 2 m2.
     assert emitters.row[:, EMITTER_AREA].sum() < 2.0
 
 
 @pytest.mark.parametrize("chosen", [(0, 1, 3), (0, 1, 2, 3), (3,)])
 def test_both_finders_find_the_same(chosen):
-    """Two implementations, which share how textured triangles are divided."""
+    """Path tracer and bake have separate implementations, but both divide textured triangles by `cut`."""
     world, emitters = found(*chosen)
     other = build_emitters(world.geometry, world.shading, 131072)
     assert len(emitters.row) == len(other.row)
@@ -97,7 +97,7 @@ def test_both_finders_find_the_same(chosen):
 
 
 def test_parts_only_say_where_samples_go(monkeypatch):
-    """With half of the parts lost, irradiance is the same: rays that hit them find their light."""
+    """If half of the parts are never sampled, irradiance is the same, because hemisphere rays hit them."""
 
     def forgetful(*arguments):
         parts = cut(*arguments)
@@ -123,6 +123,6 @@ def test_parts_only_say_where_samples_go(monkeypatch):
         error.append(estimate.standard_error)
     assert count[1] < 0.6 * count[0]
     assert (error[1] > error[0]).all()
-    # Six numbers: 4 standard errors are exceeded by chance once in 2600 such tests.
+    # Six numbers are compared. One of 2600 such tests exceeds 4 standard errors by chance.
     assert (abs(mean[1] - mean[0]) < 4 * np.hypot(*error)).all()
     assert (np.hypot(*error) < 0.05 * mean[0]).all()

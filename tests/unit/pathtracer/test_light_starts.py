@@ -1,4 +1,4 @@
-"""Where light starts and how lights are chosen: frequencies against densities, sums against powers."""
+"""Start of light subpaths and choice of lights: samples match densities, mean flux matches total power."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def scene_with(*lights, emitter=None):
 
 
 def uniform(value, cells=32):
-    """Check numbers that ought to be uniform in [0, 1]."""
+    """Assert that numbers are uniform in [0, 1]."""
     count = np.bincount(np.minimum((value * cells).astype(int), cells - 1), minlength=cells)
     assert value.min() >= -1e-9
     assert value.max() <= 1 + 1e-6
@@ -71,7 +71,7 @@ def test_lights_are_chosen_by_their_chance():
     chance = np.diff(lights.cumulative, prepend=0.0)
     assert chance.min() > 0
     assert stats.chisquare(np.bincount(light, minlength=len(chance)), chance * N).pvalue > LEVEL
-    # What starts is, on average, all the power that there is.
+    # The mean flux of a light subpath is the total power of all lights.
     area = 0.5 * math.hypot(0.8, 0.2)
     flux = out[:, BETA]
     error = flux.std() / math.sqrt(N)
@@ -104,7 +104,7 @@ def test_light_leaves_triangles_evenly_and_by_the_cosine(two_sided):
     else:
         assert (sign > 0).all()
     uniform(cosine**2)
-    # Heights of uniform points over one edge of a triangle: (1 - b)^2 is uniform.
+    # For uniform points in a triangle and a barycentric b, (1 - b)^2 is uniform.
     uniform((1 - out[:, -1]) ** 2)
     uniform((1 - out[:, -2]) ** 2)
     np.testing.assert_allclose(np.linalg.norm(out[:, GO : GO + 3], axis=1), 1, rtol=1e-6)
@@ -136,7 +136,7 @@ def test_parallel_light_covers_the_scene(sky):
 
 
 def test_aiming_at_a_triangle_has_the_density_it_tells():
-    # The mean of 1 / density is the solid angle.
+    # The mean of 1 / density is the solid angle of the triangle.
     with build_reference(scene_with(emitter=grey(0.0, 1.0)), threads=1) as reference:
         lights = reference.lights
     eye = np.array([0.3, 0.1, 0.2])

@@ -1,4 +1,4 @@
-"""Neighbours share packets of occlusion rays: their order, and that neither it nor the packets matter."""
+"""Neighbouring points share packets of occlusion rays. Order and packets do not affect the results."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ UP = np.array([0.0, 1.0, 0.0])
 
 
 def step(position):
-    """Return the mean distance of points that follow each other."""
+    """Return the mean distance of consecutive points."""
     return np.linalg.norm(np.diff(position, axis=0), axis=1).mean()
 
 
@@ -27,7 +27,7 @@ def test_neighbours_follow_each_other():
     position = np.random.default_rng(1).random((4096, 3)) * [3.0, 0.1, 2.0] - 1.0
     order = near_together(position)
     assert (np.sort(order) == np.arange(4096)).all()
-    # The side of the square that each of them has on average.
+    # On average, a point has a square of area 6 / 4096. The limit is twice the side of this square.
     assert step(position[order]) < 2 * np.sqrt(6.0 / 4096)
     assert step(position) > 1.0
 
@@ -38,7 +38,7 @@ def test_points_of_one_place_keep_their_order(n):
 
 
 def test_scattered_points_are_left_as_they_are():
-    """Sorting pays for dense points only; rows of a picture are dense, whatever lies between two rows."""
+    """Points in rows, as in an image, are dense if consecutive points are near, even if rows are far apart."""
     x, y = np.meshgrid(np.linspace(0, 8, 400), np.linspace(0, 8, 20))
     rows = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
     assert are_dense(rows, 0.05)
@@ -48,7 +48,10 @@ def test_scattered_points_are_left_as_they_are():
 
 @pytest.fixture(scope="module")
 def under_cards():
-    """Return a floor under a solid card, one with half its light let through, and a wall; and its points."""
+    """Yield (reference, position (4096, 1, 3)): points on a floor below two cards and beside a wall.
+
+    One card is opaque. The other one has the alpha 0.5.
+    """
     builder = SceneBuilder(64)
     plain = builder.material(0.5, double_sided=True)
     veil = builder.material(0.5, double_sided=True)
@@ -89,13 +92,13 @@ def test_packets_followed_as_one_meet_the_same(under_cards, monkeypatch, distanc
         found.append(opened(reference, position, distance))
     assert asked == [False, True] * 2
     assert 0.1 < found[0].min() < 0.5 < found[0].max()
-    # Of rays that meet an edge one in a million may pass it on the other side.
+    # By rounding, a ray near an edge may hit in one case and miss in the other.
     assert abs(found[0] - found[1]).max() <= 1 / 64
     assert (found[0] != found[1]).sum() <= 2
 
 
 def test_a_point_is_the_same_in_any_company(under_cards):
-    """The estimate of a point does not depend on its packet; few points are packets of their own."""
+    """The estimate of a point does not depend on the other points, with which it may share packets."""
     reference, position = under_cards
     together = opened(reference, position, 1.0)
     alone = opened(reference, position[:21], 1.0)

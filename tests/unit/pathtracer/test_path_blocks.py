@@ -1,4 +1,4 @@
-"""Eight paths side by side against one at a time, and the random numbers that they take."""
+"""Blocks of eight paths in SIMD lanes, compared with single paths, and the random numbers of paths."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ choose_lights, fetch_lanes, random_lanes = compiled(choose_lights, fetch_lanes, 
 
 
 def blocks(n=BLOCKS):
-    """Return the memory of n blocks as numbers, words, and a view (n, rows, 8)."""
+    """Return three views of the memory of n blocks: flat float32, flat uint32, float32 (n, N_ROWS, 8)."""
     s = np.zeros(n * BLOCK, np.float32)
     return s, s.view(np.uint32), s.reshape(n, N_ROWS, BLOCK_WIDTH)
 
@@ -92,7 +92,7 @@ def unit(vector):
 
 
 def many_numbers(seed=3, number=0):
-    """Return 5 uniform numbers of 64 points, 64 samples and 8 vertices, as paths take them."""
+    """Return (64, 64, 8, 6): the six random numbers that paths use for each point, sample and vertex."""
     _, words, rows = blocks(1)
     bits = words.reshape(N_ROWS, BLOCK_WIDTH)
     found = np.zeros((64, 64, 8, 6))
@@ -108,7 +108,7 @@ def many_numbers(seed=3, number=0):
 
 
 def even(count):
-    """Tell if equally likely cells were hit evenly."""
+    """Return whether the counts of equally probable cells pass a chi-square test."""
     return stats.chisquare(count.ravel()).pvalue > ALPHA
 
 
@@ -121,7 +121,7 @@ def test_numbers_are_even_alone_in_pairs_and_between_neighbours():
         assert even(np.bincount(cell[..., c].ravel(), minlength=16))
         for other in range(c):
             assert even(np.bincount((cell[..., c] * 16 + cell[..., other]).ravel(), minlength=256))
-        # The same number of the next point, the next sample, the next vertex.
+        # Numbers of adjacent points, of adjacent samples and of adjacent vertices are independent.
         for axis in range(3):
             along = np.moveaxis(cell[..., c], axis, 0)
             assert even(np.bincount((along[::2] * 16 + along[1::2]).ravel(), minlength=256))
@@ -155,7 +155,7 @@ def test_directions_follow_the_cosine_whatever_the_normal():
         assert np.allclose(rows[0, BETA], 0.25)
         a, b = unit(np.cross(tilt, [1, 2, 3])), unit(np.cross(tilt, np.cross(tilt, [1, 2, 3])))
         turn = np.arctan2((way * a).sum(axis=1), (way * b).sum(axis=1)) / (2 * np.pi) % 1
-        # The share of the hemisphere above a cosine is its square.
+        # For cosine-weighted directions, the squared cosine is uniform.
         count[
             np.arange(BLOCK_WIDTH),
             np.minimum(12 * up**2, 11).astype(int),
@@ -167,7 +167,7 @@ def test_directions_follow_the_cosine_whatever_the_normal():
 
 
 def frame(rows, normal):
-    """Write normals and their frames to a block."""
+    """Write the normals (8, 3) and their tangent frames to block 0."""
     from baker.kernels.sampling import tangent_frame
 
     rows[0, NORMAL : NORMAL + 3] = rows[0, SHADED : SHADED + 3] = normal.T
@@ -191,7 +191,10 @@ def test_roulette_is_fair():
 
 @pytest.fixture(scope="module")
 def some_lights():
-    """Return triangles (one- and two-sided), a light of each form and the sky, equally likely."""
+    """Return a light table of 20 emissive triangles, a delta light of each form and the sky.
+
+    Half of the triangles are two-sided. All 25 lights have the same probability.
+    """
     rng = np.random.default_rng(5)
     triangle, point = np.zeros((20, EMITTER_COLUMNS)), np.zeros((4, DELTA_COLUMNS))
     triangle[:, :9] = (rng.normal(size=(20, 1, 3)) * 3 + rng.normal(size=(20, 3, 3))).reshape(20, 9)
@@ -258,7 +261,7 @@ def test_lights_are_aimed_at_as_one_at_a_time(some_lights, mode, power):
             assert light[lane] == int(numbers[0] * 25)
             own = rows[0, VALUE : VALUE + 3, lane]
             if light[lane] == 24:
-                # The sky's directions come from the square in another way: only what they bring is compared.
+                # Single paths map random numbers to other sky directions, so only the light is compared.
                 cosine = rows[0, TO_LIGHT : TO_LIGHT + 3, lane] @ shaded[lane]
                 if own.max() > 0:
                     weight = {1: 1.0, 2: 1 / (1 + 25.0 ** (1 + power))}[mode]
@@ -271,7 +274,7 @@ def test_lights_are_aimed_at_as_one_at_a_time(some_lights, mode, power):
                 assert own.max() <= 1e-6
                 continue
             lit.add(found)
-            # float32 loses digits where a light is seen at a grazing angle.
+            # At grazing angles, float32 is less accurate.
             assert np.allclose(own, value, rtol=2e-3, atol=1e-6)
             assert np.allclose(rows[0, TO_LIGHT : TO_LIGHT + 3, lane], way[:3], atol=1e-5)
             assert np.isclose(rows[0, MAX_DISTANCE, lane], way[3], rtol=1e-5)
@@ -303,7 +306,7 @@ def test_hits_become_vertices_as_one_at_a_time():
     corner = rng.normal(size=(n, 3, 3))
     face = unit(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
     surface[:, :9] = corner.reshape(n, 9)
-    # Some normals look to the other side, some are none.
+    # Some vertex normals point to the other side of the face, and some are zero.
     normal = unit(face[:, None] + 0.6 * rng.normal(size=(n, 3, 3)))
     normal[::17] = 0
     surface[:, 9:18], surface[:, 18:21] = normal.reshape(n, 9), face

@@ -1,4 +1,4 @@
-"""Which kernels are compiled ahead for which scene."""
+"""Which kernels are compiled in advance, depending on the materials of the scene."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_the_scene_decides_what_is_compiled(monkeypatch, materials, kind):
     assert precompile.restart_for_materials("old", scene) == ("new" if kind else "old")
     assert started == ([kind] if kind else [])
     assert stopped == (["old"] if kind else [])
-    # Where kernels are on disk nothing is started.
+    # If all kernels are stored on disk, the process is None, and no other process is started.
     assert precompile.restart_for_materials(None, scene) is None
 
 
@@ -64,7 +64,7 @@ def test_stored_kernels_are_found_under_the_names_that_numba_gives_them(tmp_path
     assert is_stored(twice) is False
     assert twice(3.0) == 6.0
     assert is_stored(twice) is True
-    # What `drop_stale` leaves of a kernel whose source has changed does not count.
+    # `drop_stale` deletes only the index of a kernel whose source has changed. Without it, nothing is stored.
     for index in Path(twice._cache.cache_path).glob("*.nbi"):
         index.unlink()
     assert is_stored(twice) is False

@@ -1,4 +1,4 @@
-"""Which emitters neighbouring texels sample, and with what chances."""
+"""The clusters of emitters that a tile of texels samples, and their probabilities."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from baker.trace.packets import new_packet_buffers
 
 
 def world_of(radiance, wall=True, texels=16):
-    """A floor under two emitters 4 m apart, with a wall between them."""
+    """Return (world, floors): two floors, each below an emitter, 4 m apart, with a wall between them."""
     builder = SceneBuilder(64)
     grey = builder.material(0.5, double_sided=True)
     floors = [builder.quad((x, 0, 0), (0, 0, 2), (2, 0, 0), grey, (texels, texels)) for x in (0.0, 4.0)]
@@ -26,7 +26,7 @@ def world_of(radiance, wall=True, texels=16):
 
 
 def choices(world, chosen, n_light=64):
-    """Choose for some texel entries of a world, taken as one tile that begins at the first."""
+    """Return (chooser, choices) for the tile from the first to the last of the texel entries `chosen`."""
     begin, end = int(chosen[0]), int(chosen[-1]) + 1
     origin, normal = points_of(world.job.surface, world.job.valid_points, np.arange(begin, end))
     chooser = EmitterChooser.build(world.emitters, n_light, world.texels.chart)
@@ -34,7 +34,7 @@ def choices(world, chosen, n_light=64):
 
 
 def side(world, left):
-    """Return the entries of the fronts of one floor."""
+    """Return the entries of the front texels of the left or the right floor."""
     x, y = world.texels.position[: world.texels.n_front, :2].T
     return np.flatnonzero((y < 1e-3) & (x < 2.5 if left else (x > 3.5) & (x < 6.5)))
 
@@ -51,7 +51,7 @@ def test_hidden_clusters_are_set_apart_and_the_rest_is_as_if_alone(bright):
         assert choice.seen.chance.sum() == pytest.approx(1.0)
         assert len(choice.seen.chance) == own.sum()
         np.testing.assert_array_equal(choice.found.apart, ~own)
-        # Rays that hit a cluster use the density of its samples.
+        # `found` has the probabilities for the MIS weights of rays that hit an emitter.
         assert choice.found.chance[own].sum() == pytest.approx(1.0)
         assert choice.found.chance[~own].sum() == pytest.approx(chooser.n_hidden / chooser.n_light)
         assert (choice.found.cumulative == 1.0).all()
@@ -72,7 +72,7 @@ def test_without_a_wall_nothing_is_hidden():
 
 
 def test_a_tile_over_two_rooms_falls_into_parts():
-    """Both floors in one tile: each part has what it sees, and the parts cover the tile in order."""
+    """A tile with both floors is divided into consecutive parts, each with the emitters that it sees."""
     world, _ = world_of((1.0, 1e4), texels=20)
     n_front = world.texels.n_front
     _, made = choices(world, np.arange(n_front))

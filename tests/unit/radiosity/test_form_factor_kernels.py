@@ -1,4 +1,4 @@
-"""Counting, merging, balancing and multiplying sparse rows against dense matrices."""
+"""Counting, merging, balancing and multiplying sparse rows, compared with dense matrices."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_the_better_estimate_counts_more(n):
     first = np.full(n + 1, -1, np.int64)
     column, value = np.zeros(2 * rows.nnz, np.int32), np.zeros(2 * rows.nnz, np.float32)
     merge_reciprocal_estimates(*parts(rows), *parts(other), area, first, column, value)
-    # A_i F_ij weighed A_j : A_i against A_j F_ji.
+    # The merged A_i F_ij is the mean of A_i F_ij with the weight A_j, and A_j F_ji with the weight A_i.
     a, b = area[:, None], area[None, :]
     truth = (b * a * dense + a * b * dense.T) / ((a + b) * a) if n else dense
     ours = csr_matrix((value[: first[-1]], column[: first[-1]], first), shape=(n, n))
@@ -93,10 +93,10 @@ def test_rows_are_balanced_and_stay_reciprocal():
     assert factor[7] == 1
     flux = area[:, None] * balanced
     np.testing.assert_allclose(flux, flux.T, rtol=1e-5)
-    # Rows that are right already stay as they are.
+    # If the row sums equal their goals, all factors are 1.
     again = np.ones(n)
     sinkhorn_balance(*parts(rows), dense.sum(axis=1, dtype=float), np.zeros(n), again, 5)
-    # Slack is taken from what is missing, row by row.
+    # With slack, the sum of row i becomes goal_i + slack_i (1 - factor_i).
     slack, factor = rng.uniform(0, 0.2, n), np.ones(n)
     sinkhorn_balance(*parts(rows), goal, slack, factor, 200)
     reached = (factor[:, None] * dense * factor).sum(axis=1)

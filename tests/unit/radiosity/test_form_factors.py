@@ -1,4 +1,4 @@
-"""The form-factor matrix of rooms: whole rows, reciprocity, neighbours, determinism."""
+"""Form-factor matrices: row sums, reciprocity, closed forms, open scenes, determinism."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_fluxes_are_reciprocal(cube):
 
 
 def test_walls_see_each_other_as_the_closed_forms_say(cube):
-    """Opposite unit squares 0.1998249, adjacent ones 0.2000438 (Howell's catalogue C-11 and C-14)."""
+    """Form factors are 0.1998249 for opposite and 0.2000438 for adjacent unit squares (Howell C-11, C-14)."""
     world, patches, matrix = cube
     ours = by_wall(world, patches, matrix)
     for a in range(6):
@@ -81,14 +81,14 @@ def test_threads_change_no_byte(cube):
 
 
 def test_open_scenes_and_black_backs():
-    """A floor under a one-sided board that faces away, and under the sky."""
+    """A floor below a one-sided lid that faces up, and a floor below a two-sided sheet."""
     floor = Quad((0, 0, 0), (0, 0, 1), (1, 0, 0))
     lid = Quad((-50, 1, -50), (0, 0, 100), (100, 0, 0))
     world = quad_world([floor, lid], 24, inset=0.1)
     patches = build_patches(world.texels, max_patches=80)
     matrix = factors(world, patches, n_rays=128)
     on_floor = world.texels.instance[patches.member[patches.first[:-1]]] == 0
-    # The lid's front faces up: below it is black, above it is all sky.
+    # The floor sees only the black back of the lid, and the front of the lid sees only sky.
     assert (matrix.lost[on_floor] > 0.99).all()
     assert (matrix.sky[~on_floor] == 1).all()
     np.testing.assert_array_equal(matrix.row_sums(), 0)
@@ -125,7 +125,7 @@ def test_no_patches_give_no_factors():
 
 
 def test_small_patches_keep_what_large_ones_missed():
-    """Few rays of a huge lid meet the floor under it; the floor's own rays all see the lid."""
+    """Few rays of a huge lid hit the floor below it, but all rays of the floor hit the lid."""
     floor = Quad((0, 0, 0), (0, 0, 1), (1, 0, 0))
     lid = Quad((-50, 1, -50), (0, 0, 100), (100, 0, 0), grey(double_sided=True))
     world = quad_world([floor, lid], 24, inset=0.1)
@@ -133,7 +133,7 @@ def test_small_patches_keep_what_large_ones_missed():
     matrix = factors(world, patches, n_rays=128)
     on_floor = world.texels.instance[patches.member[patches.first[:-1]]] == 0
     np.testing.assert_allclose(matrix.row_sums()[on_floor], 1, atol=0.01)
-    # A house on open ground: its walls see half ground, half sky.
+    # The walls of a house on open ground see ground and sky in equal shares.
     ground = Quad((-50, 0, -50), (0, 0, 100), (100, 0, 0))
     world = quad_world([*box_quads((-2, 0.01, -2), (2, 4, 2), inward=False), ground], 48, inset=0.1)
     patches = build_patches(world.texels, max_patches=1000)

@@ -1,4 +1,4 @@
-"""Gather, AO, light samples and shadow rays against loops in plain Python on a room of a few texels."""
+"""Gather, AO, light samples and shadow rays, compared with Python loops over rays in a small room."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ REACH = 0.7
 
 @pytest.fixture(scope="module")
 def room():
-    """A room without a ceiling, an emitter that hangs in it, a two-sided board and a crate."""
+    """Return the world of a room without a ceiling, with an emitter and a two-sided board in it."""
     quads = [q for k, q in enumerate(box_quads((0, 0, 0), (2, 1.5, 2), inward=True)) if k != 3]
     quads += [
         Quad((0.5, 1.2, 0.6), (0.6, 0, 0), (0, 0, 0.5), grey(0.1, 4.0)),
@@ -47,10 +47,10 @@ def room():
 
 @pytest.fixture(scope="module")
 def rays_of(room):
-    """Rays of some texels, made and traced one by one."""
+    """Return the inputs of `gather` for 23 texels and its result, computed ray by ray in Python."""
     n_samples, n_light = 64, 23
     net, shared = sobol_reversed(n_samples, 0, 6), shared_bits_mask(n_samples)
-    # A tile that starts in the middle and fills no whole packet.
+    # The tile does not begin at texel 0, and its 23 texels are not a multiple of the packet width.
     begin, end = 40, 63
     origin, normal = points_of(room.surface, room.free, np.arange(begin, end))
     exitance = np.random.default_rng(0).random((room.texels.n, 4), np.float32)
@@ -76,7 +76,7 @@ def rays_of(room):
                 front = direction @ room.geometry.face_normal[prim] < 0
                 m = emitter_of.get(prim)
                 if m is not None and (front or room.geometry.double_sided[prim]):
-                    # Balance heuristic: the share of hemisphere rays among all rays that come this way.
+                    # Balance heuristic: expected hemisphere rays in this direction, divided by all rays.
                     radiance = room.shading.emission[room.geometry.material[prim]]
                     cosine, facing = (
                         direction @ normal[i, k],
@@ -120,7 +120,7 @@ def test_gather_is_the_sum_over_its_rays(room, rays_of):
         np.zeros(len(origin), np.uint8),
         ours,
     )
-    # A hit on the line between two texels may count for either.
+    # By rounding, a hit on the border between two texels may be assigned to either texel.
     differs = np.abs(ours - truth) > 2e-4 * (1 + np.abs(truth))
     assert differs[:, INDIRECT : INDIRECT + 3].any(axis=1).sum() <= 2
     for column in (DIRECT, DIRECT + 1, DIRECT + 2, OPEN):
@@ -155,7 +155,7 @@ def test_stages_call_the_kernels_tile_by_tile(room, rays_of):
     assert runs[0].rays == room.texels.n_front * len(net)
     np.testing.assert_allclose(runs[0].open[begin : begin + len(origin)], truth[:, OPEN], atol=1e-6)
     alone = ambient_occlusion(room.job(), n_front, n_samples=n_samples, distance=REACH)
-    # The same rays, whichever stage casts them.
+    # Both stages trace the same rays.
     np.testing.assert_array_equal(alone, runs[0].open)
     near = ambient_occlusion(room.job(), n_front, n_samples=n_samples, distance=float("inf"))
     assert (near <= alone).all()
@@ -185,7 +185,7 @@ def test_shadow_rays_add_what_they_reach(room):
 
 
 def rectangle_irradiance(point, normal, corners):
-    """Return E / L under a polygon that is above the horizon: Lambert's formula."""
+    """Return E / L of a polygon above the horizon by Lambert's formula."""
     v = np.asarray(corners, float) - point
     v /= np.linalg.norm(v, axis=1, keepdims=True)
     total = 0.0
@@ -199,9 +199,10 @@ EMITTER = (0.3, 0.4, 0.3), (0.5, 0, 0), (0, 0, 0.6)
 
 
 def lit_floor(pieces, n_light, seed=0, n_gather=64):
-    """A floor under an emitter made of `pieces` strips.
+    """Compute the light of a floor below an emitter that consists of `pieces` strips.
 
-    Returns the world, direct and gathered light, the floor's texels and their light in closed form.
+    Returns the world, the direct light, the gathered light, the floor's texels (n,) and their irradiance (n,)
+    by Lambert's formula.
     """
     (x, y, z), (width, *_), long = EMITTER
     strips = [
@@ -231,8 +232,8 @@ def lit_floor(pieces, n_light, seed=0, n_gather=64):
 
 @pytest.mark.parametrize("n_light", [16, 64])
 def test_both_estimates_of_an_emitter_meet_lamberts_formula(n_light):
-    """Light samples and hemisphere rays together give L x projected solid angle, each alone less."""
-    # More triangles than the closed form takes on.
+    """The MIS-weighted sum of light samples and hemisphere rays is L x projected solid angle."""
+    # The closed form is not used for 5 strips, because they have too many triangles.
     found = {"whole": [], "complete": [], "part": []}
     for seed in range(6):
         world, direct, gathered, own, truth = lit_floor(5, n_light, seed)
@@ -248,14 +249,14 @@ def test_both_estimates_of_an_emitter_meet_lamberts_formula(n_light):
         assert np.mean(found[name]) == pytest.approx(1, rel=4e-3)
     assert 0.05 < np.mean(found["part"]) < 0.95
     np.testing.assert_array_equal(direct.weighted[own, 0], direct.weighted[own, 2])
-    # The emitter's back and the emitter itself see none of it.
+    # The emitter does not illuminate itself or its back.
     other = world.texels.instance != 0
     assert (direct.complete[other] == 0).all()
-    # The reported error is that of the estimate, within a factor.
+    # A standard error is reported.
     told = np.sqrt(direct.variance[own].mean())
     assert told > 0
-    # Nothing is in the way: after one shadow ray from each point no other is cast, except in packets of which
-    # few texels are the floor's.
+    # The emitter is unoccluded, so only one shadow ray is traced from each of the 16 points, except in packets
+    # with few texels of the floor.
     shadow = direct.rays - 4 * world.texels.n
     assert 16 * len(own) <= shadow <= (16 if n_light == 16 else 30) * len(own)
 
@@ -263,14 +264,15 @@ def test_both_estimates_of_an_emitter_meet_lamberts_formula(n_light):
 @pytest.mark.parametrize("n_light", [16, 64])
 def test_an_unoccluded_emitter_follows_lamberts_formula(n_light):
     world, direct, gathered, own, truth = lit_floor(1, n_light)
-    # The last texel's fifteen neighbours in its packet are the emitter's: too few rays to decide.
+    # The floor's last texel may share its packet with 15 texels of the emitter. It then has too few rays to
+    # decide that the emitter is unoccluded.
     sure = own[direct.analytic[own] != 0]
     assert len(own) - len(sure) <= 1
     np.testing.assert_array_equal(direct.weighted[sure], direct.complete[sure])
     assert (gathered.direct[sure] == 0).all()
     assert (direct.variance[sure] == 0).all()
     np.testing.assert_allclose(direct.complete[sure, 0], truth[: len(sure)], rtol=2e-5)
-    # Its own texels and its back are dark without a ray.
+    # The emitter does not illuminate itself or its back.
     assert (direct.complete[world.texels.instance != 0] == 0).all()
 
 

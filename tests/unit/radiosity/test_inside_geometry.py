@@ -1,4 +1,4 @@
-"""Points in solids are inside geometry, one-sided or double-sided; points in rooms, under sheets are not."""
+"""`find_inside_geometry` finds the points of a floor in a crate, whether or not it is double-sided."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def find(world, threads=1):
 
 
 def sunk_crate(double_sided=False, inward=False):
-    """A floor with a crate sunk into it."""
+    """Return the world of a floor and a crate that is partly below the floor."""
     floor = Quad((0, 0, 0), (0, 0, 4), (4, 0, 0))
     material = grey(double_sided=double_sided)
     crate = box_quads((1.03, -0.51, 1.07), (2.53, 1.0, 2.41), inward=inward, material=material)

@@ -1,4 +1,4 @@
-"""A texel inside geometry between two regions belongs to the one from which an engine looks it up."""
+"""A texel inside geometry between two regions is assigned to the region that uses it in bilinear lookups."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ WALL = 7
 
 @pytest.fixture(scope="module")
 def floor():
-    """A square over one page, and where the points of its texels lie: columns of the page (n, 16)."""
+    """Return the world of a square, and the page column (n, 16), in texels, of the points of its n texels."""
     world = quad_world([Quad((0, 0, 0), (1, 0, 0), (0, 1, 0), grey())], size=16)
     n = world.texels.n_front
     point, normal = np.zeros((n, N_POINTS, 3), np.float32), np.zeros((n, N_POINTS, 3), np.float32)
@@ -22,12 +22,15 @@ def floor():
     every = np.full(len(world.texels.pixel), 0xFFFF, np.uint16)
     turn = np.arange(N_POINTS, dtype=np.uint8)[None]
     place_points(world.surface, every, np.arange(n), turn, point, normal, triangle, bary)
-    # The square covers 15 columns; the centre of column c lies at c + 0.5.
+    # The square covers 15 columns. The centre of column c is at c + 0.5.
     return world, 15.0 * point[..., 0].astype(float)
 
 
 def lent(floor, left_ends, right_begins):
-    """Put the columns between two inside geometry; return the regions of their texels: 0 left, 1 right."""
+    """Return the set of regions (0 left, 1 right) of each column that is inside geometry completely.
+
+    Points at columns from `left_ends` to `right_begins` are marked as inside geometry.
+    """
     world, x = floor
     bits = np.uint16(1) << np.arange(N_POINTS, dtype=np.uint16)
     mask = (((x < left_ends) | (x > right_begins)) * bits).sum(axis=1).astype(np.uint16)
@@ -42,7 +45,8 @@ def lent(floor, left_ends, right_begins):
 
 
 def test_points_within_a_texel_of_its_centre_decide(floor):
-    # Column 7 alone is inside geometry. Its centre is 0.6 away from one side and 1.2 from the other.
+    # Only column 7 is inside geometry completely. Its centre is 0.6 texels from the valid points of one region
+    # and 1.2 texels from those of the other region.
     assert lent(floor, 6.9, 8.7) == [{0}]
     assert lent(floor, 6.3, 8.1) == [{1}]
 

@@ -1,4 +1,4 @@
-"""Texels in narrow gaps are found, and share no patch with what lies outside."""
+"""Texels in narrow gaps are detected, and share no patch with texels outside the gap."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SIDE = 4.0 / 31
 
 @pytest.fixture(scope="module")
 def world():
-    """A floor; over one half of it a sheet as near as half a texel, over a quarter one 1.5 texels up."""
+    """Return the world of a floor, a sheet 0.5 texels above half of it, and a shelf at 1.5 texels."""
     floor = Quad((0, 0, 0), (0, 0, 4), (4, 0, 0))
     sheet = Quad((0, 0.5 * SIDE, 0), (2, 0, 0), (0, 0, 4))
     shelf = Quad((3, 1.5 * SIDE, 0), (1, 0, 0), (0, 0, 4))
@@ -39,7 +39,7 @@ def test_depth_follows_the_height_of_the_gap(world):
     assert (found[floor & (x > 2 + SIDE) & (x < 3 - 5 * SIDE)] == 0).all()
     middle = floor & (x > 3.4) & (x < 3.7) & (np.abs(z - 2) < 1)
     assert (found[middle] == 1).all()
-    # What looks down on the floor lies in the same gap; what looks up does not.
+    # The sheet faces down, so its texels lie in the same gap.
     sheet = world.texels.instance == 1
     assert world.texels.normal[sheet][0, 1] < 0
     assert (found[sheet & under] == 2).mean() > 0.9
@@ -73,7 +73,7 @@ def test_patches_end_at_the_mouth_of_a_gap(world):
 
 
 def test_in_a_narrow_gap_each_texel_is_a_patch_and_light_does_not_cross_it():
-    """A sheet as near to the floor as a tenth of a texel; only the floor at one edge of it is lit."""
+    """A sheet is a tenth of a texel above a floor. Only the part of the floor at one edge of it is lit."""
     floors = [Quad((9 * k, 0, 0), (0, 0, 4), (4, 0, 0)) for k in range(8)]
     sheet = Quad((1, 0.02, 1), (1.5, 0, 0), (0, 0, 1.5))
     world = quad_world([*floors, sheet], 64, inset=0.0)

@@ -1,4 +1,4 @@
-"""Patches: every texel in one, nothing mixed, areas kept."""
+"""Patches: each texel is in one patch, a patch has one chart and one side, and areas are preserved."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def texels():
 
 
 def cylinder_texels(size=64):
-    """One chart around a cylinder: normals turn along the columns."""
+    """Return the texels of one chart around a cylinder, whose normals rotate along the columns."""
     row, column = np.divmod(np.arange(size * size), size)
     angle = 2 * np.pi * column / size
     rng = np.random.default_rng(0)
@@ -59,7 +59,7 @@ def assert_sound(patches, texels):
         weight = np.maximum(texels.area[own], 1e-12).astype(float)
         assert patches.area[p] == pytest.approx(weight.sum())
         running = patches.cumulative[patches.first[p] : patches.first[p + 1]]
-        # A patch of slivers only keeps its share of the page's rounding.
+        # In patches of tiny area, cumulative areas are inaccurate by rounding.
         if weight.sum() > 1e-6:
             np.testing.assert_allclose(running, np.cumsum(weight) / weight.sum(), atol=1e-4)
     # Patches are numbered in the order of their first texel.
@@ -78,10 +78,10 @@ def test_blocks_of_one_texel(texels):
 def test_blocks_grow_until_they_are_few_enough(texels, most):
     patches = build_patches(texels, max_patches=most)
     assert_sound(patches, texels)
-    # Seven charts, one with a back: no block is large enough for fewer.
+    # There are seven charts, one of them with a back, so there are at least 8 patches.
     assert patches.n <= max(most, 8)
     assert (patches.block == 256) == (most == 1)
-    # No smaller block would have done.
+    # Blocks of half the size would give more than `most` patches.
     if patches.block > 1:
         assert build_patches(texels, max_patches=patches.n).block <= patches.block
         finer = len(

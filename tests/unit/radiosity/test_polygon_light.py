@@ -1,4 +1,4 @@
-"""Light of triangles in closed form, beside a second implementation and sums over many small pieces."""
+"""Irradiance of triangles in closed form, compared with another formula and with sums over small pieces."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ def clear(origin, normal, rows, lanes=PACKET_WIDTH):
 
 
 def by_pieces(corners, origin, normal, side=300):
-    """Return E / L (16, 16): point by point over side^2 pieces of a triangle, from both of its sides."""
+    """Return E / L (16, 16) of a two-sided triangle, summed over side^2 pieces for each point."""
     a, b, c = np.float32(corners).astype(float)
     i, j = np.divmod(np.arange(side * side), side)
     folded = i + j >= side
     i, j = np.where(folded, side - 1 - i, i), np.where(folded, side - 1 - j, j)
-    # Centroids of the pieces: upright ones, and the turned ones between them.
+    # Centroids of the pieces: triangles similar to the large one, and rotated triangles between them.
     third = np.where(folded, 2 / 3, 1 / 3)
     u, v = (i + third) / side, (j + third) / side
     u, v = np.where(folded, (i + 1 - 1 / 3) / side, u), np.where(folded, (j + 1 - 1 / 3) / side, v)
@@ -53,7 +53,7 @@ def by_pieces(corners, origin, normal, side=300):
 
 
 def by_angles(corners, origin, normal):
-    """Return E / L (16, 16) by Lambert's sum over edges, in double precision; all must be above."""
+    """Return E / L (16, 16) of a polygon above the horizon, by Lambert's sum over edges in float64."""
     arm = np.float32(corners).astype(float) - origin[:, :, None]
     arm /= np.linalg.norm(arm, axis=-1, keepdims=True)
     after = np.roll(arm, -1, axis=2)
@@ -78,7 +78,7 @@ def test_the_angle_over_its_sine():
 
 
 def test_close_to_the_edge_of_an_emitter_the_light_is_that_of_a_half_plane():
-    """A hair's breadth from the edge of an emitter at a right angle, half of the hemisphere's light comes."""
+    """Very near the edge of a perpendicular emitter, E / L tends to pi / 2, half of that of a hemisphere."""
     polygon = [emitter([(0, 0, 0), (0, 1, 0), (0, 0, 1)]), emitter([(0, 1, 1), (0, 0, 1), (0, 1, 0)])]
     for distance in (1e-2, 1e-3, 1e-4, 1e-5):
         origin = np.tile(np.float32([distance, -1e-7, 0.37]), (PACKET_WIDTH, 16, 1))
@@ -93,7 +93,7 @@ def test_close_to_the_edge_of_an_emitter_the_light_is_that_of_a_half_plane():
     ("size", "depth", "rtol"), [(1, 3, 5e-5), (0.1, 3, 2e-4), (0.02, 4, 5e-4), (0.001, 4, 5e-4)]
 )
 def test_light_from_above_meets_lamberts_sum(size, depth, rtol):
-    """From triangles that fill much of the view to those that shine from their centroid."""
+    """Sizes vary from large triangles to small ones, for which the kernel uses only the centroid."""
     rng = np.random.default_rng(1)
     for _ in range(20):
         corners = rng.normal(size=(3, 3)) * size + [0, 0, 3]
@@ -127,7 +127,7 @@ def test_only_the_front_shines_unless_both_sides_do():
     assert (shown > 0).all()
     assert not clear(origin, normal, [emitter(up)]).any()
     np.testing.assert_allclose(clear(origin, normal, [emitter(up, two_sided=True)]), shown, rtol=1e-5)
-    # Emitters add up; lanes that are not there stay out of it.
+    # The irradiance of emitters adds up. Only the first 5 lanes are computed.
     np.testing.assert_allclose(
         clear(origin, normal, [emitter(down), emitter(down)], 5), 2 * shown[:5], rtol=1e-6
     )

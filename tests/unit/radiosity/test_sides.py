@@ -1,4 +1,4 @@
-"""Texels that lie on both sides of a surface passing through them: cut, chosen, and found again by rays."""
+"""Texels on both sides of another surface are split into sides, which lookups of rays distinguish."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SIZE = 48
 
 
 def floor_and(*quads):
-    """A floor of 4 m, facing up, with other quads; every quad has cells of 1/3 of the page."""
+    """Return the world of a floor of 4 x 4 m that faces up, and of other quads."""
     return quad_world([Quad((-2, 0, 2), (4, 0, 0), (0, 0, -4), grey()), *quads], SIZE, inset=0.3)
 
 
@@ -38,7 +38,7 @@ def test_points_of_an_entry_lie_on_one_side_of_a_wall(x):
     floor = np.flatnonzero(sides.texels.instance == 0)
     place = points(sides, floor)[..., 0]
     assert ((place < x).all(axis=1) | (place > x).all(axis=1)).all()
-    # Every point of the floor belongs to just one entry: sides share a texel's area out among themselves.
+    # Each point of a split texel belongs to exactly one side. The areas of the sides sum to the texel's area.
     n = world.texels.n
     split = np.unique(sides.surface.front[n:])
     for front in split:
@@ -47,10 +47,10 @@ def test_points_of_an_entry_lie_on_one_side_of_a_wall(x):
         assert np.bitwise_or.reduce(bits) == 0xFFFF
         assert sum(bits) == 0xFFFF
         assert sides.texels.area[own].sum() == pytest.approx(world.texels.area[front], rel=1e-5)
-        # The page keeps the larger side.
+        # The side that is stored in the page is the larger one.
         assert int(sides.valid_points[front]).bit_count() >= 8
     assert len(split) >= 10
-    # Nothing else changed.
+    # Texels that are not split do not change.
     rest = np.setdiff1d(np.arange(n), split)
     assert (sides.valid_points[rest] == 0xFFFF).all()
     assert sides.texels.area[rest].tobytes() == world.texels.area[rest].tobytes()
@@ -60,7 +60,7 @@ def test_a_lookup_finds_the_centroid_of_the_side_that_is_kept():
     world = floor_and(wall(0.031))
     sides = cut(world)
     front = np.unique(sides.surface.front[world.texels.n :])
-    # The floor's u runs along x: 4 m are SIZE / 2 - 1 - 0.6 texels.
+    # The floor's u is along x, and its 4 m are SIZE / 2 - 1 - 0.6 texels.
     metres = 4.0 / (SIZE // 2 - 1.6)
     for entry in front:
         free = (int(sides.valid_points[entry]) >> np.arange(16)) & 1 == 1
@@ -79,7 +79,7 @@ def test_walls_split_the_floor_into_regions_and_a_gap_below_them_changes_nothing
         left = sides.texels.position[: sides.texels.n_front][floor][:, 0] < 0.5
         assert len(np.unique(region[left])) == len(np.unique(region[~left])) == 1
         assert region[left][0] != region[~left][0]
-        # Other charts keep their numbers.
+        # The region of other texels is the index of their chart.
         other = sides.texels.region[~floor]
         assert (other == sides.texels.chart[: sides.texels.n_front][~floor]).all()
 
@@ -92,7 +92,7 @@ def test_a_wall_that_ends_in_the_middle_leaves_one_region():
 
 
 def test_a_low_step_and_an_untouched_room_split_nothing():
-    # 1 cm on texels of 17 cm.
+    # The step is 1 cm high. The texels are 18 cm wide.
     assert len(cut(floor_and(wall(0.5, high=0.01))).owner) == 0
     room = quad_world(box_quads((0, 0, 0), (2, 1.5, 2), inward=True), 32, inset=0.2)
     sides = cut(room)
@@ -138,7 +138,7 @@ def test_values_of_sides_are_found_behind_the_numbers_in_the_images():
     found = sides.seen_patches(patch)
     assert (found.image[sides.texels.pixel[sides.owner[fronts]]] == SPLIT - np.flatnonzero(fronts)).all()
     np.testing.assert_array_equal(found.value, sides.member)
-    # Each point leads to the entry whose mask holds it.
+    # Each of a texel's 16 points is mapped to the entry whose mask contains the point.
     for s, owner in enumerate(sides.owner):
         for k in range(16):
             m = sides.table.member[s, k]
@@ -165,7 +165,7 @@ def test_a_corner_of_two_walls_is_found_in_every_texel_that_it_reaches_into(apex
     world = floor_and(*walls)
     sides = cut(world)
     floor = np.flatnonzero((world.texels.instance == 0) & ~world.texels.back)
-    # The floor's texels are squares along x and z around these points, except those at its border.
+    # Texels away from the floor's border are squares along x and z, centred at their positions.
     metres = 4.0 / (SIZE // 2 - 1.6)
     whole = floor[np.abs(world.texels.position[floor][:, [0, 2]]).max(axis=1) < 1.8]
     spot = (np.stack(np.meshgrid(np.arange(40), np.arange(40)), axis=-1).reshape(-1, 2) + 0.5) / 40 - 0.5

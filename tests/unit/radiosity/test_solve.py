@@ -1,4 +1,4 @@
-"""The solve against dense linear algebra."""
+"""The radiosity solve, compared with dense linear algebra."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ from baker.radiosity.solve import (
 
 
 def room(n, seed, open_sky=0.0):
-    """A reciprocal matrix whose rows sum to 1 - open_sky; the last patch sees nothing."""
+    """Return (matrix, dense matrix, area, rng) of n patches with reciprocal form factors.
+
+    Rows sum to 1 - open_sky, except for the last patch, whose form factors are 0.
+    """
     rng = np.random.default_rng(seed)
     area = rng.uniform(0.2, 5, n)
     flux = rng.random((n, n)) ** 3
@@ -44,7 +47,7 @@ def room(n, seed, open_sky=0.0):
 
 
 def dense_solution(dense, source, albedo):
-    """Return F (I - rho F)^-1 s, column by column."""
+    """Return F (I - rho F)^-1 s for each colour, with F = `dense`, rho = `albedo` and s = `source`."""
     eye = np.eye(len(dense))
     return np.stack(
         [dense @ np.linalg.solve(eye - albedo[:, c, None] * dense, source[:, c]) for c in range(3)], axis=1
@@ -70,7 +73,7 @@ def test_the_answer_is_that_of_a_dense_solve(albedo, open_sky):
 
 
 def coloured(matrix, rng):
-    """The same matrix with a colour for each pair, and one for the sky; and it as (3, n, n)."""
+    """Return the matrix with random transmittance between patches and to the sky, and as dense (3, n, n)."""
     n = len(matrix.first) - 1
     shared = rng.random((n, n, 3))
     shared = (shared + shared.transpose(1, 0, 2)) / 2
@@ -98,7 +101,7 @@ def test_coloured_light_between_patches_is_a_solve_for_each_colour(bounces):
             truth = truth + step @ truth
         np.testing.assert_allclose(solution.irradiance[:, c], truth, rtol=2e-3, atol=2e-4)
     if bounces is None:
-        # Light that nothing lets out or in goes into surfaces and what colours it on its way.
+        # Light is absorbed by surfaces or between them, or it escapes to the sky.
         direct = source / albedo
         energy = energy_audit(matrix, area, direct, source, solution.irradiance, albedo)
         leaving = source + albedo * solution.irradiance
@@ -122,7 +125,7 @@ def test_bounces_are_terms_of_the_neumann_series(bounces):
     matrix, dense, area, rng = room(30, 3, 0.1)
     albedo, source = rng.random((30, 3)) * 0.9, rng.random((30, 3))
     solution = solve_radiosity(matrix, source, albedo, area, bounces=bounces, progress=silent)
-    # The gather adds one bounce: light of the first reflection comes from `source` itself.
+    # The final gather adds one bounce, so the solve computes bounces - 1 terms. The first one is F s.
     term, truth = source, np.zeros((30, 3))
     for _ in range(max(bounces - 1, 0)):
         arriving = dense @ term
@@ -160,7 +163,7 @@ def test_no_patches():
 
 
 def test_a_furnace_multiplies_light():
-    """A closed room that reflects rho everywhere holds 1 / (1 - rho) of its light."""
+    """In a closed room of albedo rho, all bounces together multiply light by 1 / (1 - rho)."""
     rng = np.random.default_rng(5)
     n, area = 24, rng.uniform(1, 3, 24)
     dense = np.float32(np.tile(area / area.sum(), (n, 1)))
@@ -195,7 +198,10 @@ def test_light_is_neither_made_nor_lost():
 
 
 def rooms(count, n, passage, seed):
-    """A chain of closed rooms of n patches each; `passage` is the flux between neighbouring rooms."""
+    """Return (matrix, dense matrix, area) of a chain of closed rooms of n patches each.
+
+    `passage` is A_i F_ij between one patch of a room and one patch of the next room.
+    """
     rng = np.random.default_rng(seed)
     size = count * n
     area, flux = rng.uniform(0.5, 2, size), np.zeros((size, size))
@@ -216,7 +222,7 @@ def rooms(count, n, passage, seed):
 
 
 def refined_solution(dense, source, albedo):
-    """Return the dense solution, refined until every row is accurate by itself."""
+    """Return F (I - rho F)^-1 s, iteratively refined so that dim patches are accurate, too."""
     truth = np.zeros_like(source)
     for c in range(3):
         system = np.eye(len(dense)) - albedo[:, c, None] * dense
@@ -230,14 +236,15 @@ def refined_solution(dense, source, albedo):
 @pytest.mark.parametrize("albedo", [0.5, 0.8, 0.99])
 @pytest.mark.parametrize("dim", [1e-3, 1e-6, 1e-11])
 def test_every_patch_has_its_light_however_bright_others_are(passage, albedo, dim):
-    """Rooms beside brighter ones, apart or joined by cracks, and a colour that is dim everywhere."""
+    """A dim room, separate from a bright one or joined with it, and a dim colour have accurate light."""
     matrix, dense, area = rooms(3, 30, passage, 8)
     rho = np.clip(albedo + np.random.default_rng(9).uniform(-0.05, 0.009, (90, 3)), 0, MAX_ALBEDO)
     source = np.zeros((90, 3))
     source[:4], source[-4:] = (1.0, 1e-5, 1.0), (dim, 1e-3 * dim, dim)
     solution = solve_radiosity(matrix, source, rho, area, bounces=None, progress=silent)
     truth = refined_solution(dense, source, rho)
-    # The estimate is a bound for even light only; the worst of 72 random systems came to 1.8 times it.
+    # The error estimate is a bound only for uniform light. The largest error of 72 random systems was 1.8
+    # times the estimate.
     np.testing.assert_allclose(solution.irradiance, truth, rtol=4 * TOLERANCE)
     assert solution.patch_error <= TOLERANCE
     assert solution.iterations < 120
@@ -245,7 +252,7 @@ def test_every_patch_has_its_light_however_bright_others_are(passage, albedo, di
 
 
 def test_a_bright_ground_does_not_end_the_solve_of_a_room():
-    """An open surface converges in a step; the room beside it takes as many as it takes alone."""
+    """A bright patch that sees nothing converges at once. A room still converges as if it were alone."""
     matrix, _, area = rooms(1, 40, 0.0, 10)
     albedo, source = np.full((40, 3), 0.8), np.random.default_rng(11).random((40, 3))
     alone = solve_radiosity(matrix, source, albedo, area, bounces=None, progress=silent)

@@ -1,4 +1,4 @@
-"""Coverage lists against loops over every texel and polygon."""
+"""Lists of the triangles that overlap each texel, compared with loops over texels and triangles."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from baker.radiosity.kernels.texel_raster import keep_main_chart, list_overlaps,
 
 
 def rasterise(uv, triangle, page, size, n_pages):
-    """Return {(page, row, column): {triangle: area}} as the two passes list it."""
+    """Return {(page, row, column): {triangle: area}}. `list_overlaps` runs twice, to count and to write."""
     count = np.zeros(n_pages * size * size, np.int64)
     list_overlaps(uv, triangle, page, size, count, np.zeros(0, np.int32), np.zeros(0, np.float32))
     first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
@@ -43,7 +43,7 @@ def test_lists_are_those_of_a_loop(shape):
     ours, truth = rasterise(uv, triangle, page, size, 2), naive.covered_texels(uv, triangle, page, size)
     for key, entries in truth.items():
         for t, area in entries.items():
-            # What overlaps a texel by less than this share of its side belongs to the neighbour.
+            # Overlaps below this area may be missing.
             if area > 1e-4:
                 assert ours[key][t] == pytest.approx(area, abs=2e-6)
     for key, entries in ours.items():
@@ -85,7 +85,7 @@ def test_the_larger_chart_keeps_a_texel():
         assert total[texel_chart[i]] == pytest.approx(max(total.values()), abs=1e-6)
         own = chart[entry[span]] == texel_chart[i]
         some = own & (area[span] > 1e-7)
-        # A texel that its chart only touches keeps the first of its triangles.
+        # If the triangles of the chart only touch the texel, the first one is kept.
         np.testing.assert_array_equal(kept[span], some if some.any() else own & (np.cumsum(own) == 1))
 
 

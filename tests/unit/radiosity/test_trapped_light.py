@@ -1,4 +1,4 @@
-"""Light that hardly ends: in a closed room of albedo rho all bounces multiply it by 1 / (1 - rho)."""
+"""Warnings for closed rooms of high albedo rho, in which bounces multiply light by 1 / (1 - rho)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from baker.radiosity.trapped_light import trapped_light
 
 
 def rooms(*open_sky, patches=8):
-    """Return a matrix of rooms that see nothing of each other; a patch sees each of its own alike."""
+    """Return the form factors of separate rooms, one for each sky share in `open_sky`.
+
+    All form factors within a room are equal.
+    """
     n = patches * len(open_sky)
     dense = np.zeros((n, n))
     for k, share in enumerate(open_sky):
@@ -42,7 +45,7 @@ def gain(warnings):
 )
 def test_a_closed_room_multiplies_light_by_one_over_what_it_absorbs(albedo, expected):
     found = told(rooms(0.0), albedo)
-    # Form factors are float32: 1 - rho is known to 1e-7 or so, 1e-4 of the smallest here.
+    # Form factors are float32, so row sums have errors of about 1e-7. The smallest 1 - rho here is 1e-3.
     assert gain(found) == pytest.approx(expected, rel=0.005)
     assert ("without bound" in found[0].message) == (albedo >= 0.999)
     assert "100 % of the surface" in found[0].message

@@ -1,4 +1,4 @@
-"""Shapes and glTF files with known defects for the tests of fixes and repairs, from numpy alone."""
+"""Shapes and glTF files with known defects, for the tests of fixes and repairs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PICTURE = encode_png(np.full((2, 2, 3), 77, np.uint8))
 
 
 def box(low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0)) -> tuple[np.ndarray, np.ndarray]:
-    """Return a closed box, (8, 3) float32 and (12, 3) int64, faces outwards."""
+    """Return vertices (8, 3) float32 and triangles (12, 3) int64 of a closed box that faces outwards."""
     low, high = np.asarray(low), np.asarray(high)
     position = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float64)
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -25,7 +25,7 @@ def box(low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0)) -> tuple[np.ndarray, np.ndarr
 
 
 def torus(n: int = 12, m: int = 8) -> tuple[np.ndarray, np.ndarray]:
-    """Return a closed ring, faces outwards."""
+    """Return vertices and triangles of a torus of n x m quads that faces outwards."""
     u, v = np.meshgrid(np.arange(n) * 2 * np.pi / n, np.arange(m) * 2 * np.pi / m, indexing="ij")
     radius = 2 + 0.5 * np.cos(v)
     position = np.stack([radius * np.cos(u), 0.5 * np.sin(v), -radius * np.sin(u)], axis=-1).reshape(-1, 3)
@@ -37,7 +37,7 @@ def torus(n: int = 12, m: int = 8) -> tuple[np.ndarray, np.ndarray]:
 
 
 def volume(position: np.ndarray, triangle: np.ndarray) -> float:
-    """Return the signed volume, positive if the faces of a closed mesh look outwards."""
+    """Return the signed volume of a closed mesh, positive if its faces point outwards."""
     a, b, c = (position[triangle[:, k]].astype(np.float64) for k in range(3))
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
 
@@ -53,7 +53,7 @@ def bytes_of(array: np.ndarray) -> np.ndarray:
 
 
 def part(position, triangle, normal=None, *, stitched=False, uv=None, **members) -> EditablePrimitive:
-    """Return a primitive of float attributes; `uv` becomes TEXCOORD_0."""
+    """Return an editable primitive with float attributes. `uv` becomes TEXCOORD_0."""
     column = {"POSITION": bytes_of(position)}
     texcoord = {}
     if normal is not None:
@@ -66,16 +66,16 @@ def part(position, triangle, normal=None, *, stitched=False, uv=None, **members)
 
 
 def soup(position: np.ndarray, triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the triangles with three vertices of their own each."""
+    """Return the mesh with three separate vertices for each triangle."""
     return position[triangle].reshape(-1, 3), np.arange(3 * len(triangle)).reshape(-1, 3)
 
 
 def random_builder(seed: int) -> GltfBuilder:
-    """Return a document of a few objects with random defects, and much that a fix must not touch.
+    """Return a document of 2 to 4 objects with random defects, and with data that a fix must not change.
 
-    Each object is a box or a ring, its faces shuffled, with some of: doubled and flat faces, split vertices,
-    turned faces, no normals, normals of wrong length, failing TEXCOORD_1, tangents, custom attributes, skins,
-    morph targets, unknown extensions, lines beside it.
+    Each object is a box or a torus with shuffled faces. At random, it has duplicate and degenerate faces,
+    split vertices, flipped faces, missing normals, normals of wrong length, invalid TEXCOORD_1, tangents,
+    custom attributes, a skin, morph targets, an unknown extension, or a further primitive of lines.
     """
     rng = np.random.default_rng(seed)
     b = GltfBuilder()
@@ -164,9 +164,10 @@ def _add_random_object(b: GltfBuilder, rng: np.random.Generator, number: int, jo
 
 
 def drawn(glb: Glb, primitive: dict[str, Any], without: set[str] = frozenset()) -> set[tuple[bytes, ...]]:
-    """Return what a primitive draws: its faces with area, each as the attributes of its corners.
+    """Return the set of a primitive's faces with area, each as the attribute bytes of its three corners.
 
-    Each face starts at its least corner, so that the set tells a face from its back but not where it starts.
+    The smallest corner comes first. Two faces with the same corners are equal if their winding is the same,
+    whichever corner is first in the file.
     """
     names = [name for name in sorted(primitive["attributes"]) if name not in without]
     corner = {name: glb.corners(primitive, name) for name in names}

@@ -1,4 +1,4 @@
-"""Fixing whole files: what is not fixed survives, the look stays, a second time there is nothing to do."""
+"""`fix_file` preserves other data and the appearance, and a second fix changes nothing."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ QUICK = RepairSettings(resolution=128)
 
 
 def fix_builder(builder: GltfBuilder, folder: Path):
-    """Return the file before and after, and what was done."""
+    """Return the document before the fix, the document after it, and the result of `fix_file`."""
     path = write(folder / "scene.glb", builder)
     fixed = fix_file(path, QUICK)
     return Glb(path), Glb(fixed.data), fixed
@@ -39,7 +39,7 @@ def primitives(glb: Glb):
 
 
 def resolved(glb: Glb, primitive) -> dict:
-    """Return a primitive with the content of its accessors in place of their numbers."""
+    """Return a primitive in which accessor indices are replaced by component type and content."""
     read = lambda index: (glb.json["accessors"][index]["componentType"], glb.accessor(index).tobytes())  # noqa: E731
     out = {**primitive, "attributes": {k: read(v) for k, v in primitive["attributes"].items()}}
     if "indices" in primitive:
@@ -77,7 +77,7 @@ def test_what_is_not_fixed_survives(seed, tmp_path):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_look_stays(seed, tmp_path):
-    """Every face with area is drawn as before, unless it was said to look the wrong way."""
+    """Each face with area has the same attributes as before, unless its winding was reported as fixed."""
     before, after, fixed = fix_builder(random_builder(seed), tmp_path)
     turned = {
         fix.object.split()[-1]: fix.change.before for fix in fixed.fixed if fix.change.change == "winding"
@@ -91,9 +91,9 @@ def test_the_look_stays(seed, tmp_path):
         if a.get("mode", 4) != 4:
             continue
         new = {name for number, name in made if number == str(m)}
-        # Tangents of turned normals change their handedness with them.
+        # If normals are flipped, the handedness of tangents changes, too.
         new |= {"TANGENT"} if str(m) in turned else set()
-        # A double may go that differs in the lightmap's uv only.
+        # A duplicate face may be removed even if its TEXCOORD_1 differs.
         new |= {"TEXCOORD_1"}
         one, two = drawn(before, a, new), drawn(after, b, new)
         gone, came = one - two, two - one
@@ -131,7 +131,7 @@ def write_glb(path: Path, data: bytes) -> Path:
 
 
 def box_builder(*, uv1=None, texcoord=0, **members) -> GltfBuilder:
-    """Return a box with split vertices; its texture reads TEXCOORD_`texcoord`."""
+    """Return a document of a box with split vertices, whose texture reads the uv set `texcoord`."""
     b = GltfBuilder()
     position, triangle = box()
     flat, own = soup(position, triangle)
@@ -159,7 +159,7 @@ def test_lightmap_uv_that_overlap_are_replaced(tmp_path):
     uv = after.corners(primitive, "TEXCOORD_1").astype(np.float64)
     assert uv.min() >= 0
     assert uv.max() <= 1
-    # Twelve halves of unit squares, disjoint and all of one size, fill a good part of the page.
+    # The twelve triangles are halves of unit squares. In uv they have equal areas and fill most of the page.
     e1, e2 = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
     area = 0.5 * np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
     assert np.ptp(area) < 0.02 * area.mean()

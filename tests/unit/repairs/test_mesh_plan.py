@@ -1,4 +1,4 @@
-"""What is fixed in a single mesh: faces, vertices, winding, normals."""
+"""`plan_mesh`: fixes of faces, vertices, winding and normals of a single mesh."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def test_the_back_of_a_double_sided_face_goes_only_if_it_shows_the_same():
         "duplicate-faces": (2, 1)
     }
     assert "duplicate-faces" not in changes(fix_one(part(both, triangle, same, double_sided=True))[0])
-    # A one-sided face and its back are two sides of a sheet.
+    # If the material is one-sided, a face and its back are both visible.
     plan, made = fix_one(part(both, triangle, opposite))
     assert made is None
     assert not plan.left
@@ -193,7 +193,7 @@ def test_turned_faces_of_closed_meshes_are_turned_back(shape, seed):
     plan, made = fix_one(part(position, wrong))
     assert changes(plan)["winding"] == (len(turned), 0)
     assert volume(position, made.row[made.triangle]) == pytest.approx(volume(position, triangle))
-    # New flat normals stand on the fixed faces.
+    # The new flat normals are those of the fixed faces.
     corner = places(made, position).astype(np.float64)
     front = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     front /= np.linalg.norm(front, axis=1, keepdims=True)
@@ -208,11 +208,11 @@ def test_normals_say_which_side_is_the_front():
     assert made.normal is None
     assert not made.turned.any()
     assert volume(position, made.row[made.triangle]) == pytest.approx(1.0)
-    # A room: winding and normals agree that one looks at it from inside.
+    # A room: winding and normals agree that its faces point inwards.
     plan, made = fix_one(part(position, triangle[:, ::-1], -outward))
     assert made is None
     assert not plan.left
-    # One wall of the room is turned: it follows the others.
+    # If one wall of the room is flipped, it is flipped back.
     wrong = triangle[:, ::-1].copy()
     wrong[:2] = wrong[:2, ::-1]
     plan, made = fix_one(part(position, wrong, -outward))
@@ -246,7 +246,7 @@ def test_open_meshes_and_one_sided_bands_keep_their_winding():
 
 
 def test_a_projective_plane_is_named():
-    # Six vertices, ten faces, every edge in two faces, and no outside (the half icosahedron).
+    # The hemi-icosahedron has 6 vertices and 10 faces. Each edge is in two faces, but it has no outside.
     triangle = np.array(
         [
             [0, 1, 2],

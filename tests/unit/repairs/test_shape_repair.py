@@ -1,4 +1,4 @@
-"""Repairs of the shape: what is repaired, what is left, how far the surface moves, what is never loaded."""
+"""Repairs of shapes: repaired and remaining defects, distance of the surfaces, import of pymeshlab."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def told(fixed):
 
 
 def places(glb, primitive):
-    """Return the places of a primitive and its faces between them."""
+    """Return the distinct positions (V, 3) of a primitive and its faces (T, 3) as indices of positions."""
     corner = glb.corners(primitive, "POSITION")
     place, number = np.unique(corner.reshape(-1, 3), axis=0, return_inverse=True)
     return place, number.reshape(-1, 3)
@@ -60,9 +60,9 @@ def test_small_holes_are_closed_with_the_vertices_of_their_rims(tmp_path):
     assert told(fixed) == {"holes": (9, 0), "patches": (4797, 4800)}
     place, face = places(glb, primitive)
     assert (count_edges(face) == 2).all()
-    # Four corners of a flat quad may be joined by its other diagonal; a triangle has no choice.
+    # The patch of a quad may have the other diagonal, which changes the volume slightly.
     assert volume(place, face) == pytest.approx(volume(position, triangle), rel=1e-3)
-    # What was there is there still, and a patch's uv are those of its corners.
+    # The old faces do not change, and the vertices of patches have the uv of the rim.
     before = Glb(write(tmp_path / "before.glb", b))
     old = drawn(before, before.json["meshes"][0]["primitives"][0])
     new = drawn(glb, primitive)
@@ -75,7 +75,7 @@ def test_small_holes_are_closed_with_the_vertices_of_their_rims(tmp_path):
         strict=True,
     ):
         assert known[p.tobytes()] == t.tobytes()
-    # The furthest that the new surface is from the old one: inside the patch over two faces.
+    # The distance is the largest one of the new surface from the old one, in the patch of two faces.
     moved = {fix.change.distance for fix in fixed.fixed}
     assert len(moved) == 1
     assert 0.01 < moved.pop() < 0.1
@@ -113,7 +113,7 @@ def test_a_splinter_goes_and_a_wall_stays(tmp_path):
     fixed, glb, primitive = repaired(b, tmp_path)
     assert told(fixed) == {"non-manifold-edges": (1, 0), "non-manifold-faces": (4801, 4800)}
     assert len(places(glb, primitive)[1]) == 4800
-    # The tip of the splinter is all that is gone: it stood some 7 mm off.
+    # Only the splinter is removed. Its tip is 7 mm from a vertex, and less from the surface.
     assert 0.001 < fixed.fixed[0].change.distance < 0.007
 
     position, triangle = box()
@@ -159,12 +159,12 @@ def test_open_surfaces_are_wound_alike(tmp_path):
     assert told(fixed)["orientation"] == (2, 0)
     place, face = places(glb, primitive)
     a, b = face.ravel(), np.roll(face, -1, axis=1).ravel()
-    # Each direction of an edge comes once at most.
+    # No two faces have the same edge in the same direction.
     assert len(np.unique(a * len(place) + b)) == len(a)
 
 
 def vault(n: int = 300):
-    """Return half a pipe of length and radius 1, of 2 n slivers along its axis, front outwards."""
+    """Return a half cylinder of length and radius 1 that faces outwards, of 2 n slivers along its axis."""
     angle = np.arange(n + 1) * np.pi / n
     arc = np.stack([np.cos(angle), np.sin(angle), np.zeros(n + 1)], axis=1)
     position = np.concatenate([arc, arc + np.array([0, 0, 1])]).astype(np.float32)
@@ -181,7 +181,7 @@ def test_slivers_are_remeshed_with_their_colours_and_normals(tmp_path):
     fixed, glb, primitive = repaired(b, tmp_path)
     changes = {fix.change.change: fix.change for fix in fixed.fixed}
     assert (changes["slivers"].before, changes["slivers"].after) == (600, 0)
-    # The check reports what the repair remeshes.
+    # `check` reports the slivers that the repair remeshes.
     report = check_scene(tmp_path / "scene.glb", CheckSettings(), BakeSettings())
     reported = [f.found.count for f in report.findings if f.code == "sliver-faces"]
     assert reported == [600]
@@ -193,7 +193,7 @@ def test_slivers_are_remeshed_with_their_colours_and_normals(tmp_path):
     )
     assert np.abs(paint[:, :3] - (place / 2 + 0.5)).max() < 5e-3
     assert np.abs(made - place * [1, 1, 0]).max() < 0.02
-    # A vault of chords: its corners lie on the arc, each chord below it by (edge length)^2 / 8 at most.
+    # Vertices lie near the circle. A chord is at most (edge length)^2 / 8 from it.
     assert np.abs(np.hypot(place[:, 0], place[:, 1]) - 1).max() < 0.005
     assert 0 < changes["slivers"].distance < 0.01
     corner = glb.corners(primitive, "POSITION").astype(np.float64)
@@ -201,7 +201,7 @@ def test_slivers_are_remeshed_with_their_colours_and_normals(tmp_path):
         np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum() / 2
     )
     assert area == pytest.approx(np.pi, rel=0.01)
-    # The same bytes twice, and nothing left to do.
+    # The repair is deterministic, and a second repair changes nothing.
     assert fix_file(tmp_path / "scene.glb", REPAIR).data == fixed.data
     (tmp_path / "again.glb").write_bytes(fixed.data)
     assert fix_file(tmp_path / "again.glb", REPAIR).fixed == ()
@@ -230,12 +230,13 @@ def test_the_distance_of_two_boxes_is_their_shift():
     one = WeldedMesh(position, triangle, none, triangle)
     shifted = WeldedMesh(position + np.float32([0.25, 0, 0]), triangle, none, triangle)
     assert distance(one, shifted) == pytest.approx(0.25, abs=1e-6)
-    # A small thing in the corner of a large one: all of the small one is near, not all of the large one.
+    # A small box in the corner of a large one: the small box is near the large one everywhere, but parts of
+    # the large box are far from the small one.
     near = WeldedMesh(position * np.float32(0.1), triangle, none, triangle)
     one_sided = meshlab.largest_distance((near.position, triangle), (position, triangle))
     assert one_sided == pytest.approx(0.1, abs=1e-6)
     assert distance(one, near) == distance(near, one) == pytest.approx(np.sqrt(3 * 0.9**2), abs=1e-6)
-    # One face less: the middle of its long side is nearest to the other half's, its corner to itself.
+    # With one face missing, the distance is that of a point of this face to the nearest other face.
     less = WeldedMesh(position, triangle[:-1], none[:-1], triangle[:-1])
     assert 0.2 < distance(one, less) < 0.5
 
@@ -248,7 +249,7 @@ def test_the_distance_is_told_in_metres(tmp_path):
     b.json["nodes"][0]["scale"] = [10, 10, 10]
     ten, _, _ = repaired(b, tmp_path)
     assert ten.fixed[0].change.distance == pytest.approx(10 * one.fixed[0].change.distance)
-    # The patch is the face that was missing: what is furthest from the rest is its incircle's centre.
+    # The patch is the missing face. Its point that is furthest from the other faces is its incentre.
     a, b, c = position[triangle[7]].astype(np.float64)
     sides = [np.linalg.norm(p - q) for p, q in ((a, b), (b, c), (c, a))]
     radius = np.linalg.norm(np.cross(b - a, c - a)) / sum(sides)

@@ -1,4 +1,4 @@
-"""Alpha at a hit, and the chance that a hit counts."""
+"""Opacity at a hit, and the probability with which the hit filter accepts the hit."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ opacity_at, sample_alpha, sample_texture = compiled(opacity_at, sample_alpha, sa
 
 
 def shaded(quads):
-    """Return geometry and materials of quads whose lightmap uv does not matter."""
+    """Return the geometry and shading of quads. Their lightmap uv overlap, because no test reads them."""
     scene = quad_scene(quads)
     row, square = np.arange(4, dtype=np.int32), np.float32([[0, 0], [1, 0], [1, 1], [0, 1]])
     layouts = [
@@ -35,7 +35,7 @@ def shaded(quads):
 
 
 def sheet(mode, alpha, z=0.0, image=None, **changes):
-    """A unit square at z, facing +z."""
+    """Return a unit square at z that faces +z. `image` (H, W) is the alpha of its texture."""
     texture = None
     if image is not None:
         rgba = np.ones((*np.shape(image), 4), np.float32)
@@ -101,7 +101,8 @@ def test_opacity_is_factor_times_texture_times_vertex_colour():
         sheet("BLEND", 0.5, image=image), colour=np.float32([[1, 1, 1, a] for a in (1, 0.5, 0, 0.5)])
     )
     _, shading = shaded([quad])
-    # Triangle 0 has the corners uv (0, 0), (1, 0), (1, 1): b1 = 0.25, b2 = 0.5 is uv (0.75, 0.5).
+    # The corners of triangle 0 have the uv (0, 0), (1, 0) and (1, 1). Therefore b1 = 0.25 and b2 = 0.5 are at
+    # uv (0.75, 0.5).
     vertex = 0.25 * 1 + 0.25 * 0.5 + 0.5 * 0
     assert opacity_at(shading, 0, 0.25, 0.5) == pytest.approx(0.5 * vertex * (0.4 + 0.8) / 2, abs=1e-6)
 
@@ -112,7 +113,8 @@ def test_a_texture_of_one_value_meets_its_cutoff_everywhere():
     rays, _ = tree([sheet("MASK", 1.0, image=image, alpha_cutoff=float(np.float32(0.3)))])
     origin, direction = downward(4000)
     hit = cast(rays, origin, direction)[0] >= 0
-    # Pixel (0, 0) reaches one pixel's width around its centre; repeats bring it back at the far side.
+    # Bilinear lookups read pixel (0, 0) within a pixel's width of its centre. As the texture repeats, they
+    # also read it at the opposite sides.
     near = (np.abs(origin[:, :2] * 3 - 0.5) % 3 < 1.0).all(axis=1)
     far = ((origin[:, :2] * 3 > 2.5) | (np.abs(origin[:, :2] * 3 - 0.5) < 1.0)).all(axis=1)
     assert hit[~near & ~far].all()
@@ -120,7 +122,7 @@ def test_a_texture_of_one_value_meets_its_cutoff_everywhere():
 
 
 def test_each_texture_of_a_scene_keeps_its_own_wrap_mode():
-    """Close to the left edge a clamped lookup finds the left texel only, a repeated one both."""
+    """Near the left edge, a lookup reads only the left texel with clamp, and both texels with repeat."""
     quads = []
     for z, wrap in enumerate([("repeat", "repeat"), ("repeat", "repeat"), ("clamp", "clamp")]):
         quad = sheet("MASK", 1.0, z, image=[[0, 1]], alpha_cutoff=0.3)
@@ -148,7 +150,7 @@ def test_blend_counts_with_probability_alpha_alone_and_in_layers(alpha):
     ):
         error = np.sqrt(expected * (1 - expected) / n)
         assert (layer == k).mean() == pytest.approx(expected, abs=4 * error)
-    # The decision of a ray is independent of its position and of its neighbours.
+    # Whether a ray is stopped is independent of its position and of the previous ray.
     stopped = (layer == 2).astype(float) - alpha
     limit = 4 / np.sqrt(n)
     for other in (origin[:, 0] - 0.5, origin[:, 1] - 0.5, np.roll(stopped, 1)):
@@ -172,7 +174,7 @@ def test_the_answer_does_not_depend_on_the_packet():
 
 
 def test_a_shared_edge_is_decided_once():
-    """Rays through the diagonal of a pane meet both triangles: alpha of them stop, not 1 - (1 - a)^2."""
+    """Rays through a pane's diagonal hit two triangles. The share alpha stops, not 1 - (1 - alpha)^2."""
     n = 20000
     x = np.random.default_rng(5).integers(1, 2**16, n) / np.float64(2**16)
     origin = np.float32(np.column_stack([x, x, np.full(n, 5.0)]))

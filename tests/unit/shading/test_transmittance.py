@@ -1,4 +1,4 @@
-"""The transmittance along shadow rays: a product over all crossings, each counted once, nothing by chance."""
+"""The transmittance along shadow rays is a deterministic product over crossings, each counted once."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def passed(colour, alpha):
 
 
 def mesh_scene(*parts):
-    """Return geometry and materials of meshes (position (V, 3), triangle (T, 3)), one material for all."""
+    """Return geometry and shading of meshes (position (V, 3), triangle (T, 3)) with `pane`'s material."""
     material = pane().material
     quad = quad_scene([Quad((0, 0, 0), (1, 0, 0), (0, 1, 0), material)])
     meshes, instances, layouts = [], [], []
@@ -56,7 +56,7 @@ def mesh_scene(*parts):
 
 
 def visible(world, origin, direction, far=1e30):
-    """Return (n, 3), what light along rays is multiplied by until it arrives."""
+    """Return the transmittance (n, 3) along n rays. It is 0 if a ray is blocked."""
     n = len(origin)
     count = -(-n // 16)
     row = np.zeros((count * 16, 3), np.float32), np.zeros((count * 16, 4), np.float32)
@@ -64,7 +64,7 @@ def visible(world, origin, direction, far=1e30):
     weight = (np.arange(count * 16) < n).astype(np.float32).reshape(count, 16)
     found = []
     rays = build_ray_tree(*world, threads=1)
-    # One point a texel at a time: `add_visible` sums over points.
+    # `add_visible` averages over the 16 points of a texel, so each call has only one point with a weight.
     for k in range(16):
         only, out = weight * (np.arange(16) == k), np.zeros((count, 6), np.float32)
         origins, ways = row[0].reshape(count, 16, 3), row[1].reshape(count, 16, 4)
@@ -86,7 +86,7 @@ def test_transmittance_is_the_product_over_panes(diagonal):
     panes = [(COLOUR, 0.5), ((1, 1, 1), 0.9), ((0.2, 0.4, 1.0), 0.25), ((0, 0, 0), 0.6)]
     world = shaded([pane(0.5 * k, c, a) for k, (c, a) in enumerate(panes)])
     for n in range(1, 5):
-        # From 5 m above z = 0; pane k lies at z = k / 2.
+        # Rays start at z = 5, and pane k lies at z = k / 2. The rays end 0.25 m behind the n-th pane.
         found = visible(world, *down(diagonal=diagonal), far=5.0 - 0.5 * (4 - n) + 0.25)
         crossed = panes[4 - n :]
         np.testing.assert_allclose(found[0], np.prod([passed(*p) for p in crossed], axis=0), rtol=1e-5)
@@ -104,7 +104,7 @@ def test_walls_and_masks_block_and_holes_do_not():
 
 
 def grid(n, z=0.0):
-    """A unit square of 2 n n triangles at z that share their vertices."""
+    """Return vertices and triangles of a unit square at z: 2 n^2 triangles that share vertices."""
     x = np.linspace(0, 1, n + 1)
     position = np.array([[a, b, z] for a in x for b in x])
     corner = np.array([[i * (n + 1) + k for k in range(n)] for i in range(n)]).reshape(-1, 1)
@@ -113,7 +113,7 @@ def grid(n, z=0.0):
 
 
 def split(position, triangle):
-    """The same with vertices of its own for each triangle."""
+    """Return the mesh with separate vertices for each triangle."""
     corner = np.asarray(triangle).reshape(-1)
     return np.asarray(position)[corner], np.arange(len(corner)).reshape(-1, 3)
 
@@ -131,13 +131,13 @@ LATTICE = np.array([[i, k] for i in range(1, 16) for k in range(1, 16)]) / 16
 
 @pytest.mark.parametrize("separate", [False, True])
 def test_edges_and_vertices_count_once(separate):
-    """Rays exactly through all vertices and edges of a grid of 8 x 8 squares."""
+    """Rays pass exactly through the vertices and edges of a grid of 8 x 8 squares."""
     mesh = grid(8)
     world = mesh_scene(split(*mesh) if separate else mesh)
     origin = np.column_stack([LATTICE, np.full(len(LATTICE), 4.0)])
     found = visible(world, origin, np.tile([0.0, 0, -1], (len(origin), 1)))
     np.testing.assert_allclose(found, np.tile(SHARE, (len(found), 1)), rtol=1e-6)
-    # The same aimed at from one place: no coordinate along these rays is a round number.
+    # Rays from one point to the same vertices and edges, with coordinates that float32 rounds.
     light = np.array([0.37, 0.41, 3.0])
     way = np.column_stack([LATTICE, np.zeros(len(LATTICE))]) - light
     found = visible(world, np.tile(light, (len(way), 1)), way, far=2.0)
@@ -157,7 +157,7 @@ def test_edges_and_vertices_count_once(separate):
     ids=["two objects", "one mesh", "two faces", "three layers", "1 mm apart", "twelve panes"],
 )
 def test_layers_count_each(parts, crossings):
-    """Panes at the same place or close behind each other, met in their faces, edges and vertices."""
+    """Rays cross coincident or nearby panes in faces, edges and vertices. Each pane counts once."""
     world = mesh_scene(*parts)
     where = np.concatenate([LATTICE, LATTICE * 0.9 + 0.03])
     origin = np.column_stack([where, np.full(len(where), 4.0)])
@@ -166,7 +166,7 @@ def test_layers_count_each(parts, crossings):
 
 
 def test_a_thin_box_is_two_surfaces():
-    """A pane of 1 mm as a closed box is crossed twice, through the diagonals of its faces, too."""
+    """A ray crosses a closed box of 1 mm thickness twice, even through the diagonals of its faces."""
     position = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 0.001)], float)
     face = [[0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3], [0, 4, 5], [0, 5, 1]]
     face += [[2, 3, 7], [2, 7, 6], [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5]]
@@ -189,7 +189,7 @@ def test_a_gradient_is_looked_up_where_each_ray_passes():
     image = np.repeat(np.linspace(0.0, 1.0, 64)[None], 2, axis=0)
     origin, way = down(600)
     found = visible(shaded([sheet("BLEND", 0.8, image=image)]), origin, way)
-    # Texel centres: alpha rises from column 0.5 / 64 on; the sheet is grey of 0.5.
+    # Alpha rises linearly from the first texel centre, at 0.5 / 64, to the last. The colour is a grey of 0.5.
     alpha = 0.8 * np.clip((origin[:, 0] * 64 - 0.5) / 63, 0, 1)
     inside = (origin[:, 0] > 1 / 64) & (origin[:, 0] < 63 / 64)
     truth = (1 - alpha) * (1 - 0.5 * alpha)
@@ -197,7 +197,7 @@ def test_a_gradient_is_looked_up_where_each_ray_passes():
 
 
 def test_a_pane_seen_edge_on_is_crossed_by_nothing():
-    """Rays that run in the plane beside a pane, or parallel to it."""
+    """Rays are parallel to a pane, 0.1 mm above it."""
     origin = np.column_stack([np.full(50, -1.0), np.linspace(0.1, 0.9, 50), np.full(50, 1e-4)])
     along = np.tile([1.0, 0, 0], (50, 1))
     assert (visible(shaded([pane()]), origin, along) == 1).all()
@@ -208,18 +208,18 @@ def test_fifty_cards_are_a_product_and_not_a_chance():
     found = visible(shaded(cards), *down(PACKET_WIDTH * 16))
     np.testing.assert_allclose(found[0], passed((0.9, 1.0, 0.8), 0.1) ** 50, rtol=1e-4)
     assert np.ptp(found, axis=0).max() == 0
-    # What lets next to nothing through blocks.
+    # If the transmittance is almost zero, the ray counts as blocked.
     assert (visible(shaded([pane(0.05 * k, alpha=0.9) for k in range(50)]), *down()) == 0).all()
 
 
 def test_rays_of_all_directions_are_asked_once_at_each_crossing():
-    """Against a loop over all triangles; Embree's coherent packets would count crossings once an octant."""
+    """Compare with a loop over all triangles. Coherent packets would call the filter once per octant."""
     rng = np.random.default_rng(7)
     corner = rng.uniform(-1, 1, (300, 1, 3)) + rng.uniform(-0.5, 0.5, (300, 3, 3))
     world = mesh_scene((corner.reshape(-1, 3), np.arange(900).reshape(-1, 3)))
     origin, way = rng.uniform(-1, 1, (640, 3)), rng.normal(size=(640, 3))
     corner = world[0].position[world[0].triangle].astype(float)
-    # Moeller and Trumbore, all rays against all triangles.
+    # Moeller-Trumbore intersection of all rays with all triangles.
     a, b = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     p = np.cross(way[:, None], b[None])
     det = (p * a).sum(-1)
@@ -230,11 +230,11 @@ def test_rays_of_all_directions_are_asked_once_at_each_crossing():
     assert crossing.max() > 6
     found = visible(world, origin, way, far=1.5)
     wrong = abs(found / SHARE ** crossing[:, None] - 1).max(axis=1) > 1e-4
-    assert wrong.sum() <= 1  # one at an edge may fall to the other side in float32
+    assert wrong.sum() <= 1  # by rounding, one ray near an edge may hit or miss
 
 
 def test_a_sphere_is_left_once_and_crossed_twice():
-    """Rays from its middle through all vertices, and middles of edges, of a sphere of 320 triangles."""
+    """Rays through the vertices and edge midpoints of a sphere, from its centre and from outside."""
     corner = icosphere(2)
     world = mesh_scene((corner.reshape(-1, 3), np.arange(3 * len(corner)).reshape(-1, 3)))
     aim = np.concatenate([corner.reshape(-1, 3), 0.5 * (corner + np.roll(corner, 1, axis=1)).reshape(-1, 3)])
@@ -246,13 +246,13 @@ def test_a_sphere_is_left_once_and_crossed_twice():
 
 
 def test_a_wall_that_a_pane_passes_through_still_blocks():
-    """Rays across a wall that sticks in a pane; those beside it pass the pane once."""
+    """A wall intersects a pane. Rays through the wall are blocked, rays beside it cross the pane once."""
     wall = Quad((0.5, 0, -1), (0, 1, 0), (0, 0, 2), grey())
     world = shaded([Quad((0, 0, 0), (1, 0, 0), (0, 1, 0), pane().material), wall])
     origin, _ = down(200)
     along = np.tile([0.0, 0.3, -5.0], (200, 1))
     np.testing.assert_allclose(visible(world, origin - along, 2 * along)[0], SHARE, rtol=1e-5)
-    # To the other side of the wall.
+    # These rays end on the other side of the wall.
     across = np.column_stack([1.0 - 2.0 * origin[:, 0], np.zeros(200), np.full(200, -1.0)])
     crossing = visible(world, origin * [1, 1, 0.1], across, far=1.0)
     assert (crossing[origin[:, 0] != 0.5] == 0).all()

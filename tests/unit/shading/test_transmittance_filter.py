@@ -1,4 +1,4 @@
-"""Which surfaces colour light, and what each crossing multiplies it by."""
+"""Which surfaces colour light that passes through, and the factor of each crossing."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ COLOUR = (1.0, 0.5, 0.0)
 
 
 def pane(z=0.0, colour=COLOUR, alpha=0.5, mode="BLEND", rgba=None, vertex=None):
-    """A unit square at z, facing +z; `rgba` (H, W, 4) is a linear texture, `vertex` (4, 4) colours."""
+    """Return a unit square at z that faces +z.
+
+    `rgba` (H, W, 4) is its texture, with linear colours, and `vertex` (4, 4) its vertex colours.
+    """
     texture = None if rgba is None else Texture(np.float32(rgba), wrap=("clamp", "clamp"))
     material = replace(grey(), base_colour=(*colour, alpha), base_colour_texture=texture, alpha_mode=mode)
     return Quad((0, 0, z), (1, 0, 0), (0, 1, 0), material, vertex)
@@ -41,13 +44,13 @@ def tree(quads):
 
 @kernel
 def _cast(buffers, origin, direction, far, any_hit, end, kept):
-    """Trace rays by sixteens; write where they end and what light along them keeps."""
+    """Trace n rays in packets of 16. Write their ends to `end` (n,) and colour factors to `kept` (n, 3)."""
     on, rays, words, width = buffers.lane_valid, buffers.lane_floats, buffers.lane_words, buffers.width
     function = buffers.occluded if any_hit else buffers.intersect
     for group in range(0, len(origin), PACKET_WIDTH):
         for lane in range(PACKET_WIDTH):
             i = min(group + lane, len(origin) - 1)
-            # Every third ray is left out.
+            # Every third ray is not traced.
             on[lane] = -1 if group + lane < len(origin) and i % 3 < 2 else 0
             for a in range(3):
                 rays[(ORG_X + a) * PACKET_WIDTH + lane] = origin[i, a]
@@ -55,7 +58,7 @@ def _cast(buffers, origin, direction, far, any_hit, end, kept):
             rays[TFAR * PACKET_WIDTH + lane] = far
             words[GEOM_ID * PACKET_WIDTH + lane] = NO_HIT
         trace_lanes(function, buffers.scene, width, buffers.query, on, rays, buffers.valid, buffers.floats)
-        # A query for any hit leaves the rows of hits as they were: they must not be looked at.
+        # An any-hit query does not write the rows of hits, so they must not be read.
         if any_hit:
             trace_transmittance(
                 buffers.blend, buffers.occluded, width, on, rays, None, buffers.valid, buffers.floats
@@ -72,7 +75,7 @@ def _cast(buffers, origin, direction, far, any_hit, end, kept):
 
 
 def cast(rays, n=500, far=100.0, any_hit=False):
-    """Cast rays down at the unit square from 5 m above; return place (n, 2), end (n,) and colour (n, 3)."""
+    """Trace rays down from z = 5. Return (x, y), end and colour factor (3,) of each traced ray, as arrays."""
     rng = np.random.default_rng(0)
     origin = np.float32(np.column_stack([rng.uniform(0.01, 0.99, (n, 2)), np.full(n, 5.0)]))
     end, kept = np.zeros(n, np.float32), np.zeros((n, 3), np.float32)
@@ -102,7 +105,7 @@ def test_blend_surfaces_are_chosen_and_told_from_white_ones():
     for k in (7, 8, 9):
         assert build_transmittance_table(shaded(quads[k : k + 1])[1]).coloured
         assert tree(quads[k : k + 1]).tracer.coloured
-    # White panes colour nothing; without any BLEND triangle kernels do without transmittance.
+    # White panes do not colour light. Without BLEND triangles, kernels do not compute a transmittance.
     white = tree(quads[:7])
     assert white.tracer.blend_scene is not None
     assert not white.tracer.coloured
@@ -113,12 +116,12 @@ def test_blend_surfaces_are_chosen_and_told_from_white_ones():
 
 @pytest.mark.parametrize("any_hit", [False, True])
 def test_each_crossing_on_the_way_multiplies_once(any_hit):
-    """Two panes above a floor; a third one under it and a fourth behind the rays' ends count for nothing."""
+    """Only panes that a ray crosses before its end count, not those below the floor or beyond `far`."""
     floor = [] if any_hit else [Quad((0, 0, -1), (1, 0, 0), (0, 1, 0), grey())]
     quads = [pane(0.0), pane(1.0, (0.2, 0.4, 1.0), 0.25), *floor, pane(-2.0), pane(-50.0)]
     _, end, kept = cast(tree(quads), far=6.5)
     first, second = np.float32([1.0, 0.75, 0.5]), np.float32([0.8, 0.85, 1.0])
-    # Where a ray ends nothing passed: not even the surface that stopped it counts.
+    # The surface that stops a ray does not count.
     for length, colour in ((4.0, first * 0 + 1), (5.0, second), (6.0 if floor else 6.5, first * second)):
         there = abs(end - length) < 0.01
         assert there.sum() > 40

@@ -1,4 +1,4 @@
-"""Slivers are the triangles less than a fiftieth as high as long, however they lie."""
+"""Slivers are triangles whose height is less than 1/50 of their longest side."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from baker.topology.slivers import SLIVER, find_slivers
 
 
 def height_over_length(corner):
-    """Return the ratio by Heron's formula, from the lengths of the sides alone."""
+    """Return the height over the longest side, divided by that side, by Heron's formula."""
     sides = [float(np.linalg.norm(corner[k] - corner[k - 1])) for k in range(3)]
     s = sum(sides) / 2
     area = max(s * (s - sides[0]) * (s - sides[1]) * (s - sides[2]), 0.0) ** 0.5

@@ -1,4 +1,4 @@
-"""Closed parts are told from sheets by their edges, and crates from rooms by what is in them."""
+"""`find_solids` distinguishes solids from sheets by their edges, and from rooms by their contents."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ SMALL = box((0.4, 0.4, 0.4), (0.6, 0.6, 0.6))
 
 
 def covers(*objects, **more):
-    """Tell of each object whether it is a cover."""
+    """Return for each object whether all its triangles are covers."""
     return [bool(cover.all()) for _, _, _, cover in classify(*objects, **more)]
 
 
 def classify(*objects, viewpoints=NOBODY, double_sided=True, emits=(), hit_filter=()):
-    """Return (inside, room, sealed, cover) of each object's triangles."""
+    """Return (inside, room, sealed, cover) for each object, arrays with one element per triangle."""
     count = [len(one) for one in objects]
     corner = np.concatenate(objects).reshape(-1, 3)
     owner = np.repeat(np.arange(len(objects)), count)
@@ -62,7 +62,7 @@ def classify(*objects, viewpoints=NOBODY, double_sided=True, emits=(), hit_filte
 
 
 def kinds(found):
-    """Return the distinct codes of each object."""
+    """Return the distinct values of `inside` of each object."""
     return [sorted(set(inside.tolist())) for inside, *_ in found]
 
 
@@ -75,12 +75,12 @@ def test_a_crate_on_a_floor_is_solid_and_the_floor_is_not(double_sided):
 
 def test_crates_of_several_objects_and_several_crates_in_one_object():
     sides = [CRATE[2 * k : 2 * k + 2] for k in range(6)]
-    # Their corners differ by a rounding error.
+    # The corners of adjacent sides differ by a rounding error.
     sides[3] = sides[3] + 2e-7
     assert kinds(classify(FLOOR, *sides)) == [[NOWHERE]] + 6 * [[BEHIND]]
     beside = np.concatenate([CRATE, shifted(CRATE, 1, 0, 0), shifted(CRATE, 0, 3, 0)])
     inside = classify(FLOOR, beside)[1][0]
-    # The wall between the two that touch belongs to none.
+    # The coincident walls of the two touching crates are the surface of no solid.
     assert (inside == NOWHERE).sum() == 4
     assert (inside == BEHIND).sum() == 32
 
@@ -113,12 +113,12 @@ def test_a_crate_without_a_bottom_covers_what_it_stands_on():
     assert covers(FLOOR, bottomless) == [False, True]
     assert covers(FLOOR, bottomless, double_sided=False) == [False, False]
     assert covers(FLOOR, bottomless[:, ::-1]) == [False, False]
-    # A hut with a light, and one with furniture.
+    # With a light or furniture inside, the crate is a hut, not a cover.
     assert covers(FLOOR, bottomless, viewpoints=[(0.5, 0.5, 0.5)]) == [False, False]
     assert covers(FLOOR, bottomless, shifted(SMALL, 0, -0.4, 0)) == [False, False, False]
     two_holes = np.delete(CRATE, [4, 5, 6, 7], axis=0)
     assert covers(FLOOR, two_holes) == [False, False]
-    # A door: half of a wall is absent.
+    # Half of a wall is missing, like a door.
     assert covers(FLOOR, np.delete(CRATE, [4, 5, 11], axis=0)) == [False, False]
 
 
@@ -127,9 +127,9 @@ def test_small_holes_do_no_harm():
     (_, (inside, _, sealed, _)) = classify(FLOOR, holed)
     assert (inside == BEHIND).all()
     assert not sealed.any()
-    # Something stands in it: one looks in.
+    # With an object inside it, the ball with a hole is not solid.
     assert kinds(classify(FLOOR, holed, 0.2 * SMALL))[1] == [NOWHERE]
-    # An edge that meets two half as long: a slit without width.
+    # A T-junction, an edge beside two edges of half its length, does not open the crate.
     split = np.concatenate([CRATE[:1], CRATE[2:]])
     a, b, c = CRATE[1]
     middle = 0.5 * (b + c)
@@ -145,7 +145,7 @@ def test_rooms_are_told_from_crates_by_what_is_in_them():
     assert (inside == NOWHERE).all()
     assert room.all()
     assert kinds(classify(FLOOR, CRATE, SMALL, emits=[2]))[1:] == [[NOWHERE], [BEHIND]]
-    # An emitter set into the ceiling, and one that hangs on the wall outside.
+    # An emitter in the ceiling makes the crate a room. An emitter at the outside of a wall does not.
     assert kinds(classify(FLOOR, CRATE, shifted(SMALL, 0, 0.45, 0), emits=[2]))[1] == [NOWHERE]
     assert kinds(classify(FLOOR, CRATE, shifted(SMALL, 0, 0, 0.55), emits=[2]))[1] == [BEHIND]
 
@@ -154,9 +154,9 @@ def test_rooms_that_look_inwards():
     room = box((-3, 0, -3), (3, 3, 3), inward=True)
     assert kinds(classify(room)) == [[NOWHERE]]
     assert kinds(classify(room, CRATE)) == [[NOWHERE], [BEHIND]]
-    # Furniture that stands a little in the floor.
+    # The crate is partly below the floor of the room.
     assert kinds(classify(room, CRATE - [0, 0.1, 0], FLOOR - [0, 1, 0])) == [[NOWHERE], [BEHIND], [NOWHERE]]
-    # Thick walls: the solid is what lies between.
+    # A house with thick walls: the solid is the space between the outer and the inner walls.
     house = box((-3.3, -0.3, -3.3), (3.3, 3.3, 3.3))
     for objects in ((house, room), (np.concatenate([house, room]),)):
         found = classify(*objects, CRATE, viewpoints=[(0, 2, 0)])

@@ -1,4 +1,4 @@
-"""Triangles with a hit filter: rejected hits do not count, triangles keep their numbers."""
+"""Rays ignore hits that a hit filter rejects, and report the index of a triangle in the scene."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ U, PRIM = HIT_U - NG_X, PRIM_ID - NG_X
 
 @cfunc(types.void(types.voidptr))
 def refuse(arguments):
-    """Refuse the hits of triangles that a table of bytes names, in the half of them where u < 0.3."""
+    """Reject hits with u < 0.3 on triangles whose byte in the table is not 0."""
     given = carray(arguments, (6,), np.int64)
     n = given[5] & 0xFFFFFFFF
     valid = carray(pointer(given[0]), (n,), np.int32)
@@ -47,7 +47,7 @@ def case():
 
 
 def first_that_counts(position, triangle, refused, origin, direction):
-    """Take triangles one by one: the nearest that is not refused at its own hit."""
+    """Return (distance, triangle) of the nearest hit that is not rejected, by a loop over all triangles."""
     best, found = np.inf, -1
     for k in range(len(triangle)):
         reach, prim = naive.intersect(position, triangle[k : k + 1], origin, direction)
@@ -65,14 +65,14 @@ def test_refused_hits_do_not_count(case, width):
     rays = RayScene(position, triangle, threads=1, hit_filter=see)
     geom, prim, _, _, reach = cast(rays, origin, direction, width=width)
     hit = truth[:, 1] >= 0
-    # A ray past an edge, or past u = 0.3, within rounding may be counted on either side of it.
+    # By rounding, a ray near an edge or near u = 0.3 may hit or miss.
     assert (hit != (geom >= 0)).sum() <= 1
     both = hit & (geom >= 0)
     assert both.sum() > 150
     same = prim[both] == truth[both, 1]
     assert (~same).sum() <= 1
     np.testing.assert_allclose(reach[both][same], truth[both, 0][same], rtol=2e-5)
-    # Geometry 1 has the chosen triangles, geometry 0 all others, each under its number in the scene.
+    # Geometry 1 has the triangles with a hit filter, and geometry 0 has the others.
     assert (geom[both] == see.chosen[prim[both]]).all()
     assert set(geom[both]) == {0, 1}
     plain = cast(RayScene(position, triangle, threads=1), origin, direction, width=width)
@@ -98,7 +98,7 @@ def test_all_triangles_or_none_may_be_chosen(case, chosen):
 
 
 def test_shared_edges_do_not_leak_between_the_geometries():
-    """A sheet of a chosen and a plain half, hit exactly along the edge that they share."""
+    """Rays hit exactly the edge between a triangle with a hit filter and a triangle without one."""
     position = np.float32([[0, 0, 0], [1, 0, 0.1], [1, 1, 0], [0, 1, 0.1]])
     nothing = np.zeros(N, np.uint8)
     see = HitFilter(np.array([True, False]), refuse.address, nothing.ctypes.data, nothing)

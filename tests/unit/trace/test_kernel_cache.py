@@ -1,4 +1,4 @@
-"""Kernels without a writable cache folder: they compile and run, and a bake prints a warning."""
+"""The kernel cache: a warning without a writable folder, and compilation after changes of source files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 from baker.trace import kernel_cache
 
-# No folder can be written, as in a read-only install without a home.
+# Script that makes all folders unwritable, as in a read-only installation without a home folder.
 NOWHERE = """
 import os
 from numba.core import caching
@@ -110,7 +110,7 @@ def test_a_kernel_is_compiled_again_when_a_file_it_is_made_of_has_changed(tmp_pa
 
     assert run(1) == ["1", "0"]
     assert run() == ["1", "1"]
-    # A clock that is off must not cost a compilation in every run.
+    # A source file with a time in the future must not cause a compilation in each run.
     ahead = time.time() + 1000
     os.utime(outer / "kernel.py", (ahead, ahead))
     assert run()[0] == "1"

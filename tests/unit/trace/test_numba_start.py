@@ -1,4 +1,4 @@
-"""Numba starts without scipy when asked to, and kernels run all the same."""
+"""After `skip_blas`, Numba does not import SciPy, and kernels still run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Packets against embreex's own calls and against Moeller and Trumbore on every triangle."""
+"""Ray packets, compared with queries of embreex and with a loop over all triangles."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_hits_are_those_of_every_triangle_tried(soup_rays, width, robust):
     for (low, high), truth in cases:
         geom, prim, u, v, reach = cast(rays, origin, direction, low, high, width=width)
         hit = truth[:, 1] >= 0
-        # A ray past an edge within rounding may be counted on either side of it.
+        # By rounding, a ray near an edge may hit or miss.
         assert (hit != (geom >= 0)).sum() <= 1
         both = hit & (geom >= 0)
         assert both.sum() > 150
@@ -83,7 +83,7 @@ def test_embreex_answers_the_same():
     for width in WIDTHS:
         geom, prim, u, v, reach = cast(rays, origin, direction, width=width)
         hit = geom >= 0
-        # The twin's tree is built otherwise: where two triangles cross a ray at one distance, either may win.
+        # embreex builds another tree. If a ray hits two triangles at one distance, either may be reported.
         assert (hit != (told["geomID"] >= 0)).sum() == 0
         same = prim[hit] == told["primID"][hit]
         assert (~same).sum() <= 2
@@ -123,7 +123,7 @@ def test_small_scenes(width):
     geom, _, u, v, reach = cast(one, origin, down, width=width)
     np.testing.assert_array_equal(geom, [0, -1, -1])
     np.testing.assert_allclose([u[0], v[0], reach[0]], [0.2, 0.2, 1.0], rtol=1e-6)
-    # A point, a line and a triangle of no area hide nothing behind them and crash nothing.
+    # Triangles that are a point or a line are never hit.
     flat = np.float32([[0, 0, 0.5]] * 3 + [[0, 0, 0.5], [0.5, 0.5, 0.5], [1, 1, 0.5]])
     position = np.concatenate([corner, flat])
     both = RayScene(position, np.int32([[3, 4, 5], [6, 7, 8], [0, 1, 2]]), threads=1)
@@ -151,7 +151,7 @@ def closed_room(n, rng):
 
 
 def rays_at_seams(position, triangle, share, rng):
-    """Aim from inside at the points that lie `share` (n,) along edges chosen at random."""
+    """Return origins inside the room, and directions to points at the share `share` (n,) of random edges."""
     n = len(share)
     t, k = rng.integers(0, len(triangle), n), rng.integers(0, 3, n)
     a, b = position[triangle[t, k]], position[triangle[t, (k + 1) % 3]]
@@ -168,12 +168,12 @@ def test_no_ray_escapes_through_an_edge():
     for width in WIDTHS:
         assert (cast(robust, origin, direction, width=width)[0] >= 0).all()
         assert (cast(robust, origin, direction, width=width, occluded=True)[4] < 0).all()
-    # Without the flag rays do leak here, so the test above can fail.
+    # Without robust mode, rays do escape, so the assertions above are significant.
     assert 0.01 < (cast(plain, origin, direction)[0] < 0).mean() < 0.2
 
 
 def test_few_rays_escape_through_a_vertex():
-    """Embree keeps tiny cracks at vertices: few of the rays aimed exactly at one leak, none beside it."""
+    """Less than 1 % of the rays aimed exactly at vertices escape, and no ray aimed slightly beside them."""
     rng = np.random.default_rng(13)
     position, triangle = closed_room(2000, rng)
     origin, direction = rays_at_seams(position, triangle, np.zeros(100_000), rng)

@@ -1,4 +1,4 @@
-"""TEXCOORD_1 that the scene brings along: kept to the byte, packed as rectangles, or refused."""
+"""TEXCOORD_1 of the scene is kept unchanged, packed as one rectangle per object, replaced, or refused."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_objects_that_each_fill_the_square_become_rectangles(mode):
     scales = []
     for layout in atlas.layouts:
         source = meshes[scene.instances[layout.instance].mesh].texcoord[1].astype(float)
-        # One scale and offset for the whole object, u and v alike, no turn.
+        # The object's uv are shifted and scaled, by the same factor for u and v, but not rotated.
         design = np.concatenate([source, np.ones((len(source), 1))], axis=1)
         fit, *_ = np.linalg.lstsq(design, layout.uv.astype(float), rcond=None)
         np.testing.assert_allclose(design @ fit, layout.uv, atol=1e-6)
@@ -63,7 +63,7 @@ def test_objects_that_each_fill_the_square_become_rectangles(mode):
         assert not layout.kept
         owner_of[np.unique(layout.chart) + 1] = layout.instance + 1
     assert least_gap(owner_of[owner], 3) == 3
-    # Texels go by area in the world: the second box has edges twice as long.
+    # All objects have the same number of texels per area. The edges of the second box are twice as long.
     assert scales[1] / scales[0] == pytest.approx(2.0, rel=1e-5)
     assert scales[2] == pytest.approx(scales[0], rel=1e-5)
 
@@ -124,13 +124,13 @@ def test_unwrap_never_keeps():
     scene = make_scene([box_mesh(uv=box_uv())], [(0, place())])
     atlas = unwrap(scene, uv="unwrap")
     assert not atlas.layouts[0].kept
-    # The six faces are squares again: their own uv is three times two.
+    # The new charts are squares. In the mesh's TEXCOORD_1 they are rectangles with the aspect ratio 2 : 3.
     uv = atlas.layouts[0].uv[atlas.layouts[0].triangle].astype(float)
     np.testing.assert_allclose(np.ptp(uv[..., 0], axis=1), np.ptp(uv[..., 1], axis=1), rtol=1e-4)
 
 
 def test_shared_edges_and_rounding_are_no_overlap():
-    # A sheet of 64 quads whose uv is a rotated square, rounded to 12 bits.
+    # A sheet of 64 quads. Its uv are a rotated grid, rounded to 12 bits.
     s, t = (a.ravel() for a in np.meshgrid(np.arange(9) / 8, np.arange(9) / 8, indexing="ij"))
     angle = 0.3
     uv = np.stack([np.cos(angle) * s - np.sin(angle) * t, np.sin(angle) * s + np.cos(angle) * t], axis=1)

@@ -1,4 +1,4 @@
-"""Densities, several pages, and what happens when there is no room."""
+"""Atlases with a requested density, with several pages, and with more charts than pages can hold."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_density_is_exact_and_overflows_into_pages():
     atlas = unwrap(boxes(40), resolution=256, density=32, padding=2)
     assert codes(atlas) == []
     assert {layout.texels_per_metre for layout in atlas.layouts} == {32.0}
-    # 40 boxes of 6 x (32 + 1 + 2)^2 texels need 4.5 pages of 256^2 at the very least.
+    # 40 boxes with 6 charts of (32 + 1 + 2)^2 texels need at least 4.5 pages of 256^2 texels.
     assert 5 <= atlas.n_pages <= 6
     assert {layout.page for layout in atlas.layouts} == set(range(atlas.n_pages))
     for layout in atlas.layouts:
@@ -52,7 +52,7 @@ def test_too_few_pages_lower_the_density_of_all(max_pages):
     assert codes(atlas) == ["uv.density_lowered"]
     got = {layout.texels_per_metre for layout in atlas.layouts}
     assert len(got) == 1
-    # Twice the pages' area would be enough for the density asked for.
+    # The requested density needs 5 to 6 pages. Density is proportional to the square root of the area.
     assert 32 * np.sqrt(max_pages / 5) * 0.75 < got.pop() < 32
 
 
@@ -84,10 +84,11 @@ def test_more_charts_than_all_pages_hold_are_refused():
 
 
 def test_the_page_is_filled():
-    # The largest density: with 3 % more the boxes no longer fit.
+    # The density is nearly the largest possible: with 4 % more, the boxes need two pages.
     atlas = unwrap(boxes(30), resolution=256, padding=2)
     density = atlas.layouts[0].texels_per_metre
     more = unwrap(boxes(30), resolution=256, padding=2, density=density * 1.04)
     assert more.n_pages == 2
-    # 180 squares: 14 to a row of 254 texels, 2 empty ones after each.
+    # A row of 254 texels has 14 of the 180 charts, so a chart has 254 // 14 = 18 texels, 2 of them empty. The
+    # first and the last of the other 16 texel centres are 15 texels apart.
     assert np.ptp(atlas.layouts[0].uv[:4, 0]) * 256 == pytest.approx(254 // 14 - 3, abs=1e-3)

@@ -1,4 +1,4 @@
-"""The pieces of the unwrap against slow twins: overlap count, outlines, packing, fallback charts, workers."""
+"""Steps of the unwrap: overlap counts, outlines, packing, planar charts, parts, worker processes."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def test_packed_outlines_keep_their_gap():
         (x, y), (w, h) = result.position[k], size[k]
         assert min(x, y) >= 2
         assert max(x + w, y + h) <= 126
-        # Nobody within three texels.
+        # No other chart lies within three texels.
         assert page[max(0, y - 3) : y + h + 3, max(0, x - 3) : x + w + 3].max() == 0
         page[y : y + h, x : x + w] = k + 1
 
@@ -118,7 +118,7 @@ def test_nothing_is_placed_on_a_ring():
     shapes = Shapes(
         corner, np.array([0, 8, 10]), np.array([[40, 40], [10, 10.0]]), np.ones(2), np.zeros(2, bool)
     )
-    # One span a row bridges the hole: what fits beside the ring does, and nothing is placed on it.
+    # An outline has one span per row, which includes the hole of the ring. The squares are placed beside it.
     result = pack(shapes, np.array([0, 1, 1]), np.ones(2), (64, 2), silent, 0.0)
     assert result.placed == 3
     for x, y in result.position[1:]:
@@ -130,7 +130,7 @@ def test_fit_page_finds_the_density_of_a_single_square():
     shapes = rectangles(np.array([[2.0, 2.0]]))
     found = fit_page(shapes, np.array([0]), (100, 2), silent, (0, 1))
     assert found is not None
-    # 100 texels less the border of 1 on each side: centres 97 apart.
+    # Without the border of 1 texel on each side, 98 texels are left. Their outer centres are 97 texels apart.
     assert found[0] == pytest.approx(97 / 2, rel=0.006)
     assert found[1].scale[0, 0] == pytest.approx(97 / 2)
 
@@ -161,13 +161,13 @@ def test_planar_charts_cover_a_torus_without_overlap():
     real = 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     e1, e2 = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
     flat = 0.5 * np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
-    # A projection shrinks by the cosine of a lean of at most 75 degrees, and never grows.
+    # A projection multiplies area by the cosine of the angle to the plane, which is at most 75 degrees.
     assert (flat > 0.24 * real).all()
     assert (flat <= real * (1 + 1e-9)).all()
 
 
 def test_topology_on_known_cases():
-    # Two triangles that share an edge, one that touches by a vertex, one apart.
+    # Two triangles that share an edge, one that shares a vertex with them, and a separate one.
     triangle = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 5], [6, 7, 8]])
     assert connected_vertices(triangle, 9).tolist() == [0, 0, 0, 1]
     assert connected_faces(triangle, np.zeros(4, int)).tolist() == [0, 0, 1, 2]
@@ -222,7 +222,7 @@ def test_a_worker_that_dies_leaves_its_triangles_without_chart(monkeypatch):
 @pytest.mark.timed
 @pytest.mark.parametrize("error", [None, KeyboardInterrupt])
 def test_cancel_kills_the_workers_within_a_second(error):
-    # A curled part of this size takes the library several seconds.
+    # xatlas needs several seconds for a curved part of this size.
     job = job_of(ball_mesh(6))
     started = threading.Event()
     when = []
@@ -246,7 +246,7 @@ def test_cancel_kills_the_workers_within_a_second(error):
 
 
 def pids() -> set[int]:
-    """Children of this process that run."""
+    """Return the process ids of the running children of this process."""
     found = set()
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():

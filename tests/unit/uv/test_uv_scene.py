@@ -1,4 +1,4 @@
-"""Atlases of whole scenes against the contract of `Atlas` and independent geometry."""
+"""Atlases of whole scenes: the guarantees of `Atlas`, density, padding, stretch and determinism."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_a_box_is_six_undistorted_charts():
     scene = make_scene([mesh], [(0, place())])
     atlas = unwrap(scene, resolution=256)
     assert atlas.n_charts == 6
-    # Charts are stretched to whole texels: at most half a texel on the shortest side.
+    # Charts are scaled to whole texels, which changes the shortest side, of 1 m, by at most half a texel.
     shortest = atlas.layouts[0].texels_per_metre
     assert np.abs(stretch(atlas.layouts[0], mesh, scene) - 1).max() < 0.6 / shortest + 1e-3
 
@@ -60,7 +60,7 @@ def test_curved_meshes_have_few_charts_and_little_stretch(mesh, most_charts, lea
     atlas = unwrap(scene, resolution=512)
     values = stretch(atlas.layouts[0], mesh, scene)
     assert atlas.n_charts <= most_charts
-    # 1 % of the triangles may lie outside: the rims of charts.
+    # At the rims of charts, up to 1 % of the triangles may exceed the limits.
     assert np.quantile(values, 0.01) > least
     assert np.quantile(values, 0.99) < most
     assert atlas.warnings == ()
@@ -76,7 +76,7 @@ def test_a_finely_tessellated_ball_is_not_taken_for_a_plane():
 
 
 def test_density_in_texels_is_what_the_layout_says():
-    # Each face of the boxes must have its area in texels, whatever the instance's scale.
+    # The area of a box in texels is its world area times the squared density, for each scale.
     mesh = box_mesh()
     scene = make_scene([mesh], [(0, place(0)), (0, place(3, 2.0)), (0, place(9, (1.0, 2.0, 4.0)))])
     atlas = unwrap(scene, resolution=512)
@@ -97,7 +97,7 @@ def test_mirrored_instances_lie_like_the_others():
     first, second = atlas.layouts
     np.testing.assert_array_equal(first.vertex, second.vertex)
     shift = (second.uv - first.uv) * 256
-    # The same charts, each moved by whole texels.
+    # The charts of both instances are equal up to a shift by whole texels.
     np.testing.assert_allclose(shift, np.round(shift), atol=1e-3)
     assert np.abs(shift).max() >= 1
 
@@ -117,11 +117,10 @@ def test_padding_is_there_and_the_border_is_free(padding):
     scene = make_scene(meshes, [(0, place()), (1, place(3)), (2, place(6)), (0, place(9, 0.3))])
     atlas = unwrap(scene, resolution=256, padding=padding)
     owner = owner_maps(atlas)[0]
-    # A bilinear lookup reads one texel beyond a chart: two charts need two between them.
+    # A bilinear lookup reads one texel beyond a chart, so charts have at least two texels between them.
     assert least_gap(owner, max(padding, 2)) == max(padding, 2)
     rim = max(1, padding // 2)
     assert owner[:rim].max() == owner[-rim:].max() == owner[:, :rim].max() == owner[:, -rim:].max() == 0
-    # And the page is well used.
     assert (owner > 0).mean() > 0.45
 
 
@@ -132,7 +131,7 @@ def test_straight_borders_lie_on_texel_centres():
 
 
 def test_split_normals_do_not_cut_charts_but_keep_their_vertices():
-    # The strip with three vertices of its own for every triangle, as importers make for flat shading.
+    # `flat` has three separate vertices for each triangle, as importers create them for flat shading.
     smooth = bent_mesh()
     corner = smooth.position[smooth.triangle].reshape(-1, 3)
     flat = make_mesh(corner, np.arange(len(corner)).reshape(-1, 3))
@@ -160,7 +159,7 @@ def test_degenerate_duplicate_and_sliver_triangles_all_get_uv():
         * 256**2
         / atlas.layouts[0].texels_per_metre ** 2
     )
-    # The box and the three copies have the area they have in space.
+    # The triangles of the box and the three copies have their world area, 0.5 m2.
     np.testing.assert_allclose(np.delete(area, [12, 13, 14]), 0.5, rtol=0.05)
 
 
@@ -177,7 +176,7 @@ def test_the_unit_of_length_does_not_matter():
 
 
 def test_the_bytes_do_not_depend_on_threads_or_repetition():
-    # More than 3000 triangles: this goes through worker processes.
+    # The scene has more than 3000 triangles, so the unwrap uses worker processes.
     meshes = [torus_mesh(), ball_mesh(3), box_mesh()]
     scene = make_scene(meshes, [(k % 3, place(4.0 * k)) for k in range(6)])
     one, two, again = (unwrap(scene, resolution=256, threads=n) for n in (1, 2, 2))
@@ -211,7 +210,7 @@ BLACK = (0.0, 0.0, 0.0, 1.0)
     ids=["black emitter", "invisible", "black", "opaque whatever its alpha", "emitter that reflects"],
 )
 def test_what_shows_no_light_leaves_the_page_to_the_rest(material, gives_way):
-    # A dome 100 times as wide as the box that it surrounds.
+    # The dome surrounds the box and is 100 times as wide.
     scene = make_scene([box_mesh(), box_mesh((100.0, 100.0, 100.0))], [(0, place()), (1, place())])
     dome = replace(scene.meshes[1], material=scene.meshes[1].material + 1)
     scene = replace(scene, meshes=(scene.meshes[0], dome), materials=(Material(), material))
@@ -220,10 +219,10 @@ def test_what_shows_no_light_leaves_the_page_to_the_rest(material, gives_way):
     alone = unwrap(make_scene([box_mesh()], [(0, place())]), resolution=256).layouts[0].texels_per_metre
     if gives_way:
         assert density[0] > 0.9 * alone
-        # Stretch is measured in world units, and the dome keeps at least a texel a face.
+        # The density of the dome is much lower, but above 0.
         assert 0.0 < density[1] < 0.01 * density[0]
     else:
         assert density[0] == density[1] < 0.02 * alone
-    # A density that was asked for is kept.
+    # A requested density applies to all objects.
     dense = unwrap(scene, resolution=256, density=0.5)
     assert [layout.texels_per_metre for layout in dense.layouts] == [0.5, 0.5]

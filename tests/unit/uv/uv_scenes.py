@@ -1,4 +1,4 @@
-"""Small scenes for the unwrap tests, made from nothing but numpy."""
+"""Small meshes and scenes for the tests of the unwrap."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def place(x: float = 0.0, scale: float | tuple[float, float, float] = 1.0) -> Ma
 
 
 def box_mesh(size=(1.0, 1.0, 1.0), name: str = "box", uv=None) -> Mesh:
-    """Twelve triangles; eight shared vertices without uv, four a face with."""
+    """Return a box of 12 triangles with four separate vertices per face. `uv` (24, 2) is its TEXCOORD_1."""
     faces, triangles = [], []
     for axis in range(3):
         for side in (0.0, 1.0):
@@ -52,7 +52,7 @@ def box_mesh(size=(1.0, 1.0, 1.0), name: str = "box", uv=None) -> Mesh:
 
 
 def box_uv(low: float = 0.02, high: float = 0.98) -> NDArray[np.float32]:
-    """Six disjoint squares, 3 x 2, for `box_mesh`."""
+    """Return uv (24, 2) for `box_mesh`: six separate rectangles in a 3 x 2 grid from `low` to `high`."""
     uv = []
     for k in range(6):
         cell = np.array([k % 3, k // 3]) / (3, 2)
@@ -64,7 +64,7 @@ def box_uv(low: float = 0.02, high: float = 0.98) -> NDArray[np.float32]:
 def grid_mesh(
     rows: int, columns: int, surface, name: str = "grid", wrap: tuple[bool, bool] = (False, False)
 ) -> Mesh:
-    """Triangulate surface(s, t) on a grid; `wrap` closes it along s or t."""
+    """Return a grid of triangles on surface(s, t), with s and t in 0 to 1. `wrap` closes it along s or t."""
     n_s, n_t = rows + (not wrap[0]), columns + (not wrap[1])
     s, t = np.meshgrid(np.arange(n_s) / rows, np.arange(n_t) / columns, indexing="ij")
     position = np.stack(surface(s, t), axis=-1).reshape(-1, 3)
@@ -83,7 +83,7 @@ def torus_mesh(major: int = 48, minor: int = 24) -> Mesh:
 
 
 def bent_mesh() -> Mesh:
-    """A strip bent along a half circle of radius 1: it can be laid flat without any stretch."""
+    """Return a strip along a half circle of radius 1, which can be unrolled without stretch."""
     return grid_mesh(24, 4, lambda s, t: (np.cos(np.pi * s), np.sin(np.pi * s), t), "strip")
 
 

@@ -1,4 +1,4 @@
-"""Slow, independent looks at an atlas: what it covers, how far charts are apart, how it stretches."""
+"""Slow reference functions for an atlas: covered texels, gaps between charts, stretch."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from baker.core.scene import Mesh, Scene
 
 
 def covered_texels(uv, resolution: int) -> set[tuple[int, int]]:
-    """List the texels whose square a (3, 2) uv triangle enters: separating axes, one texel at a time."""
+    """Return the (row, column) of texels whose square overlaps a uv triangle (3, 2), by separating axes."""
     p = np.asarray(uv, float) * resolution
     low, high = np.floor(p.min(axis=0)).astype(int), np.floor(p.max(axis=0)).astype(int)
     r, c = np.meshgrid(np.arange(low[1], high[1] + 1), np.arange(low[0], high[0] + 1), indexing="ij")
@@ -31,7 +31,7 @@ def covered_texels(uv, resolution: int) -> set[tuple[int, int]]:
 
 
 def owner_maps(atlas: Atlas) -> np.ndarray:
-    """Return (P, H, W) chart + 1 of each texel entered; fails if two charts enter one texel."""
+    """Return (P, H, W): chart + 1 of covered texels, 0 elsewhere. Fails if two charts cover one texel."""
     page = np.zeros((atlas.n_pages, atlas.resolution, atlas.resolution), np.int64)
     for layout in atlas.layouts:
         for corner, chart in zip(layout.uv[layout.triangle], layout.chart, strict=True):
@@ -42,7 +42,7 @@ def owner_maps(atlas: Atlas) -> np.ndarray:
 
 
 def least_gap(owner: np.ndarray, most: int) -> int:
-    """Return the least number of empty texels between two charts' texels (Chebyshev), up to `most`."""
+    """Return the smallest number of empty texels between two charts (Chebyshev distance), up to `most`."""
     none = 1 << 40
     big = np.where(owner == 0, none, owner)
     for gap in range(most + 1):
@@ -55,7 +55,10 @@ def least_gap(owner: np.ndarray, most: int) -> int:
 
 
 def stretch(layout: InstanceLayout, mesh: Mesh, scene: Scene) -> np.ndarray:
-    """Return (T, 2) singular values of metres -> uv of triangles with area, relative to their L2 mean."""
+    """Return the singular values (T, 2) of the map from metres to uv, for the T triangles with area.
+
+    The values are divided by their area-weighted root mean square.
+    """
     matrix = scene.instances[layout.instance].world_from_object[:3, :3]
     p = (mesh.position.astype(float) @ matrix.T)[mesh.triangle]
     q = layout.uv[layout.triangle].astype(float)
@@ -69,14 +72,14 @@ def stretch(layout: InstanceLayout, mesh: Mesh, scene: Scene) -> np.ndarray:
 
 
 def check_contract(atlas: Atlas, scene: Scene) -> None:
-    """Assert what every layout promises."""
+    """Assert the guarantees of `Atlas` and `InstanceLayout`."""
     assert [layout.instance for layout in atlas.layouts] == list(range(len(scene.instances)))
     seen: set[int] = set()
     for layout in atlas.layouts:
         mesh = scene.meshes[scene.instances[layout.instance].mesh]
         assert layout.vertex.dtype == layout.triangle.dtype == layout.chart.dtype == np.int32
         assert layout.uv.dtype == np.float32
-        # Row t is the mesh's triangle t, corner by corner.
+        # Row t of `layout.triangle` is triangle t of the mesh, with the same order of corners.
         np.testing.assert_array_equal(layout.vertex[layout.triangle], mesh.triangle)
         assert layout.chart.shape == (len(mesh.triangle),)
         assert np.isfinite(layout.uv).all()

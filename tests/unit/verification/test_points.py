@@ -1,4 +1,4 @@
-"""The compared points of a bake, their rooms, and the reference of lookups at edges."""
+"""Points that `verify` compares: rooms and gaps around them, footprints of lookups at edges, charts."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def test_lookups_beside_a_wall_are_held_against_their_own_side():
     with reference:
         found = edge_points(reference, geometry, owner, covered, 400, 16, 0)
     mine = found.owner == 0
-    # Where lookups take place: the floor's uv follows its x and y.
+    # x of the lookups, in metres. On the floor, u is a linear function of x.
     column = found.pixel % SIZE + 0.5 + found.surface.offset[:, 0]
     uv, position = geometry.uv[:4], geometry.position[:4]
     fit = np.polyfit(uv[:, 0] * SIZE, position[:, 0], 1)
@@ -122,13 +122,13 @@ def test_lookups_beside_a_wall_are_held_against_their_own_side():
     assert straddles.sum() > 10
     side = np.sign(found.surface.position[..., 0] - 1.013)
     assert (side[straddles] == np.sign(x - 1.013)[straddles, None]).all()
-    # Elsewhere they lie around the point, no further than a lookup reaches.
+    # All points of a footprint lie within 2.1 texels of the lookup.
     off = np.abs(found.surface.position[..., 0] - x[:, None])[mine]
     assert off.max() < 2.1 * width
 
 
 def test_footprints_have_the_mean_of_a_lookup():
-    """Light that is linear over the floor: the mean of a footprint is the light at its point."""
+    """The mean position of a footprint is the position of its lookup, so linear light has no error."""
     geometry, owner, reference = surface([Quad((0, 0, 0), (2, 0, 0), (0, 2, 0))])
     with reference:
         found = edge_points(reference, geometry, owner, owner >= 0, 500, 256, 0)
@@ -139,7 +139,7 @@ def test_footprints_have_the_mean_of_a_lookup():
     for k in (0, 1):
         mean = found.surface.position[inside, :, k].mean(axis=1)
         error = (mean - np.polyval(fit[k], at[inside, k])) / fit[k][0]
-        # Sixteen points of each texel stand for it: 0.07 texels each, and a lookup takes four.
+        # A texel has 16 points, so its mean position has an error of 0.07 texels. A lookup uses four texels.
         assert np.abs(error).mean() < 0.05
         assert abs(error.mean()) < 0.02
 
@@ -162,7 +162,7 @@ def test_charts_are_pieces_of_uv():
     scene = quad_scene(quads)
     geometry = world_geometry(scene, quad_atlas(scene, 32))
     np.testing.assert_array_equal(chart_numbers(geometry), [0, 0, 1, 1])
-    # Corners that were split for their normals still join, other objects in the same place do not.
+    # Split vertices with equal uv are joined, but other objects with the same uv are not.
     split = replace(
         geometry,
         uv=geometry.uv[geometry.triangle.reshape(-1)],

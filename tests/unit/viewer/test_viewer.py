@@ -1,4 +1,4 @@
-"""The data that the page gets, and requests that are refused."""
+"""The data that the viewer's page gets, and requests that the server refuses."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def out(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def server(out):
-    # A file of the user's own beside the bake, and one that only the manifest believes to be there.
+    # A file of the user in the output folder, and a file outside it that only a changed manifest lists.
     (out / "notes.txt").write_text("private")
     (out.parent / "secret.txt").write_text("private")
     sound = (out / "bake.json").read_text("utf-8")
@@ -203,7 +203,7 @@ def test_a_missing_library_is_a_sentence(monkeypatch):
 
 
 def test_names_stay_inside_the_page(out):
-    # The page writes names as text only: no file of it may build HTML from strings.
+    # The page must show names as text only, so its scripts may not build HTML from strings.
     for path in (Path(script.__file__).parent / "static").glob("*.js"):
         text = path.read_text("utf-8")
         assert not any(word in text for word in ("innerHTML", "outerHTML", "insertAdjacentHTML", "eval(")), (
