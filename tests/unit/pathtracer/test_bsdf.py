@@ -74,8 +74,8 @@ def test_samples_follow_their_density(name, degrees):
     random = np.random.default_rng(3).random((200_000, 3))
     found = draw_many(row, *view, random)
     up = found[:, 2] > 0
-    # Samples of a rough lobe below the surface are lost. The integral of the density and the lost share sum to
-    # 1. The tolerance is three standard errors of the lost share, plus the error of the midpoint rule.
+    # Samples of a rough lobe below the surface are lost. The lost share and the density's integral sum to 1.
+    # The tolerance is three standard errors of the lost share, plus the error of the midpoint rule.
     lost = 1 - up.mean()
     assert mass.sum() + lost == pytest.approx(1, abs=3 * np.sqrt(lost * up.mean() / len(up)) + 2e-4)
     if name == "lambert":

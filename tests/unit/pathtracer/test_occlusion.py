@@ -38,7 +38,7 @@ def test_points_of_one_place_keep_their_order(n):
 
 
 def test_scattered_points_are_left_as_they_are():
-    """Points in rows, as in an image, are dense if consecutive points are near, even if rows are far apart."""
+    """Points in rows are dense if consecutive points are near, even if the rows are far apart."""
     x, y = np.meshgrid(np.linspace(0, 8, 400), np.linspace(0, 8, 20))
     rows = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
     assert are_dense(rows, 0.05)

@@ -255,8 +255,8 @@ def test_both_estimates_of_an_emitter_meet_lamberts_formula(n_light):
     # A standard error is reported.
     told = np.sqrt(direct.variance[own].mean())
     assert told > 0
-    # The emitter is unoccluded, so only one shadow ray is traced from each of the 16 points, except in packets
-    # with few texels of the floor.
+    # The emitter is unoccluded, so only one shadow ray is traced from each of the 16 points. Packets with few
+    # texels of the floor are an exception.
     shadow = direct.rays - 4 * world.texels.n
     assert 16 * len(own) <= shadow <= (16 if n_light == 16 else 30) * len(own)
 

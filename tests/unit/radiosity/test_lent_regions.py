@@ -45,8 +45,8 @@ def lent(floor, left_ends, right_begins):
 
 
 def test_points_within_a_texel_of_its_centre_decide(floor):
-    # Only column 7 is inside geometry completely. Its centre is 0.6 texels from the valid points of one region
-    # and 1.2 texels from those of the other region.
+    # Only column 7 is inside geometry completely. Its centre is 0.6 texels from the valid points of one
+    # region, and 1.2 texels from those of the other region.
     assert lent(floor, 6.9, 8.7) == [{0}]
     assert lent(floor, 6.3, 8.1) == [{1}]
 
