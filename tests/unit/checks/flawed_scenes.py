@@ -91,7 +91,7 @@ def point(intensity: float, at: Any = (0, 2, 0), **more: Any) -> tuple:
 
 
 def sun(turn: Any, intensity: float = 1000.0) -> tuple:
-    """Return a directional light and its node, which the quaternion `turn` rotates from the direction -Z."""
+    """Return a directional light and its node with the rotation `turn`, a quaternion that rotates -Z."""
     return {"type": "directional", "intensity": intensity}, {"rotation": list(turn)}
 
 

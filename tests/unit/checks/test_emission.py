@@ -1,4 +1,4 @@
-"""Emissive textures in `check`: mean radiance over the part that the uv use, and position of the emission."""
+"""Emissive textures in `check`: mean radiance over the part that the uv cover, and place of the emission."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`Scene.origin` is 0 for scenes near 0, and otherwise near most objects. Skies and strays do not move it."""
+"""`Scene.origin` is 0 for scenes near 0, and otherwise near most objects of the scene."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from baker.core.scene import Instance, PunctualLight
 
 
 def room(at=(0.0, 0.0, 0.0), scale=1.0, quads=()):
-    """Return a scene: a room of 2 m with a crate, both moved by node transforms, and `quads`, not moved."""
+    """Return a scene of a room of 2 m with a crate, moved by node transforms, and of `quads`, not moved."""
     inside = box_quads((-1, 0, -1), (1, 2, 1), inward=True)
     crate = box_quads((0.1, 0, 0.1), (0.5, 0.4, 0.5), inward=False)
     scene = quad_scene([*inside, *crate, *quads])

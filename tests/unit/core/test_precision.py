@@ -44,7 +44,7 @@ def test_vertices_far_away_are_named_with_their_step(at, texel, step):
     assert f"{1000 * texel:.3g} mm" in found.text or "1 m" in found.text
     assert "coarser" in found.text
     assert "translation" in found.fix
-    # Texels that are 100 times as large are not affected.
+    # With texels 100 times as large, nothing is reported.
     assert coarse_objects(floor(at, "vertices"), np.array([100 * texel])) is None
 
 

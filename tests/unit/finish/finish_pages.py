@@ -24,7 +24,7 @@ BRIGHTNESS = (1.0, 4.0, 0.25, 2.0, 0.6)
 
 
 def distance_to_edges(polygon: NDArray, x: NDArray, y: NDArray) -> NDArray:
-    """Return the signed distance of (x, y) to a convex polygon's nearest edge, positive inside, texels."""
+    """Return the signed distance in texels of (x, y) to a convex polygon's nearest edge, positive inside."""
     nearest = np.full(np.shape(x), np.inf)
     for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
         edge = (b - a) / np.linalg.norm(b - a)

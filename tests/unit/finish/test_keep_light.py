@@ -111,7 +111,7 @@ def test_rare_bright_samples_are_not_lost(seed: int) -> None:
 
 
 def test_kept_texels_stay_as_they_were_sampled() -> None:
-    """A dark strip with a small standard error lies in bright noise, which a filter would blur into it."""
+    """A dark strip with a small standard error lies in bright noise. A filter would blur light into it."""
     chart = np.zeros((64, 64), np.int32)
     random = np.random.Generator(np.random.PCG64(4))
     value = np.abs(random.normal(1.0, 0.3, (64, 64, 1))).astype(np.float32).repeat(3, axis=2)

@@ -134,7 +134,7 @@ def test_recentring_stays_in_bounds_and_leaves_whole_texels_alone():
 
 
 def test_steps_and_faces_are_not_continued_beyond_what_was_measured():
-    """Values stay within the measured range for light that jumps between faces or at a shadow edge."""
+    """Values stay within the measured range if light jumps from face to face or at the edge of a shadow."""
 
     def faces(k, x, y):
         return 1.0 + (np.floor(x / 3.7) + 2 * np.floor(y / 2.9) + k) % 3

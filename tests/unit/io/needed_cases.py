@@ -123,7 +123,7 @@ def both(*changes: Callable[[Document], None]) -> Callable[[Document], None]:
 
 
 def bytes_of(name: str, data: bytes) -> Callable[[Document], bytes]:
-    """Return a function that returns the buffer with `data` at the start of an attribute's view."""
+    """Return a function that returns the buffer with `data` written over the start of an attribute's view."""
 
     def change(document: Document) -> bytes:
         index = FIRST["indices"] if name == "indices" else FIRST["attributes"][name]

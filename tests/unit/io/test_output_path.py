@@ -1,4 +1,4 @@
-"""Names of outputs to which nothing can be written are refused with one sentence."""
+"""Output paths to which nothing can be written are refused with a one-sentence error."""
 
 from __future__ import annotations
 

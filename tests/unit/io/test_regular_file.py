@@ -1,4 +1,4 @@
-"""Inputs that are no regular files, too long files and Git LFS pointers: refused at once, by name."""
+"""Input files that are not regular, are too large, or are Git LFS pointers are refused by name at once."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ KINDS = ["pipe", "device", "socket", "folder", "endless link", "pointer", "link 
 
 
 def odd_file(path: Path, kind: str) -> Path:
-    """Make a file of a kind at `path`."""
+    """Create a file of the kind `kind`, one of `KINDS`, at `path`."""
     if kind == "pipe":
         os.mkfifo(path)
     elif kind == "device":
@@ -132,7 +132,7 @@ def test_a_file_is_measured_before_it_is_read(place: Path) -> None:
     with pytest.raises(OSError, match="at most"):
         read_regular(place / "big")
     assert read_regular(place / "big", first=6) == b"abcdab"
-    # Of a buffer, only what `byteLength` declares is read.
+    # Only the first `byteLength` bytes of a buffer's file are read.
     builder = quad_builder()
     with (place / "odd").open("wb") as stream:
         stream.write(builder.blob)
@@ -169,5 +169,5 @@ def test_a_small_file_takes_little_memory(place: Path, what: str) -> None:
     )
     done = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, check=True)
     peak, told = json.loads(done.stdout)
-    assert peak < 400_000  # kilobytes
+    assert peak < 400_000  # peak memory, kilobytes
     assert ("67108864 rows but no data" in told) == (what == "rows without data")

@@ -105,7 +105,7 @@ def test_sequences_are_nets_for_every_texel(seed, pair):
 
 
 def test_sequences_differ_by_seed_and_stage():
-    """Sequences of two seeds may be correlated by chance. The mean correlation of 400 seeds is zero."""
+    """Two single sequences may be correlated by chance. The mean correlation over 400 seeds is zero."""
     np.testing.assert_array_equal(sobol_reversed(64, 3, 5), sobol_reversed(64, 3, 5))
     numbers = np.array([[sobol_reversed(64, seed, pair) for pair in (5, 6)] for seed in range(400)])
     assert len(np.unique(numbers.reshape(-1, 128), axis=0)) == 800

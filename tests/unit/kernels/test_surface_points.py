@@ -187,7 +187,7 @@ def place_one(position, normal, b1, b2, flip=False):
 
 
 def test_a_rounded_facet_is_lifted_to_the_curve():
-    """On a facet with the vertex normals of a sphere, the middle moves towards the sphere, corners stay."""
+    """On a facet with vertex normals of a sphere, its middle is moved to the sphere, and corners are not."""
     corner = np.array([[0.3, 0.0, 1.0], [-0.2, 0.3, 1.0], [-0.2, -0.3, 1.0]])
     corner /= np.linalg.norm(corner, axis=1, keepdims=True)
     middle = corner.mean(axis=0)

@@ -12,7 +12,7 @@ from baker.lights.uv_integral import uv_means
 
 (sample_texture,) = compiled(sample_texture)
 WRAPS = ("repeat", "mirror", "clamp")
-# height, width
+# (height, width) of the test images.
 SIZES = ((6, 5), (1, 40), (37, 2), (3, 67))
 
 

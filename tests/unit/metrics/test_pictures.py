@@ -87,7 +87,8 @@ def test_texels_that_stand_out():
     page[0, 70, 80:82] = 40.0
     found = outlier_texels(page, ALL, 2)
     np.testing.assert_array_equal(found, [20 * SIZE + 30, 50 * SIZE + 60])
-    # Next to an empty texel the score is 1, no outlier. Two adjacent outliers hide each other.
+    # A texel next to an empty texel has the score 1, so it is no outlier. Two adjacent outliers hide each
+    # other.
     hole = ALL[0].copy()
     hole[21, 30] = False
     score = outlier_factor(page[0, ..., 0].astype(np.float64), hole)

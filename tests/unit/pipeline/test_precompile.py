@@ -64,7 +64,7 @@ def test_stored_kernels_are_found_under_the_names_that_numba_gives_them(tmp_path
     assert is_stored(twice) is False
     assert twice(3.0) == 6.0
     assert is_stored(twice) is True
-    # `drop_stale` deletes only the index of a kernel whose source has changed. Without it, nothing is stored.
+    # `drop_stale` deletes only the index of a kernel whose source has changed. Then the kernel is not stored.
     for index in Path(twice._cache.cache_path).glob("*.nbi"):
         index.unlink()
     assert is_stored(twice) is False

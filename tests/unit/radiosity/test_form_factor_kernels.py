@@ -60,7 +60,7 @@ def test_the_better_estimate_counts_more(n):
     first = np.full(n + 1, -1, np.int64)
     column, value = np.zeros(2 * rows.nnz, np.int32), np.zeros(2 * rows.nnz, np.float32)
     merge_reciprocal_estimates(*parts(rows), *parts(other), area, first, column, value)
-    # The merged A_i F_ij is the mean of A_i F_ij with the weight A_j, and A_j F_ji with the weight A_i.
+    # The merged A_i F_ij is the weighted mean of A_i F_ij (weight A_j) and A_j F_ji (weight A_i).
     a, b = area[:, None], area[None, :]
     truth = (b * a * dense + a * b * dense.T) / ((a + b) * a) if n else dense
     ours = csr_matrix((value[: first[-1]], column[: first[-1]], first), shape=(n, n))

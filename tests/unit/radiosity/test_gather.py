@@ -252,7 +252,6 @@ def test_both_estimates_of_an_emitter_meet_lamberts_formula(n_light):
     # The emitter does not illuminate itself or its back.
     other = world.texels.instance != 0
     assert (direct.complete[other] == 0).all()
-    # A standard error is reported.
     told = np.sqrt(direct.variance[own].mean())
     assert told > 0
     # The emitter is unoccluded, so only one shadow ray is traced from each of the 16 points. Packets with few

@@ -1,4 +1,4 @@
-"""`find_inside_geometry` finds the points of a floor in a crate, whether or not it is double-sided."""
+"""`find_inside_geometry` finds the points of a floor that are in a one-sided or double-sided crate."""
 
 from __future__ import annotations
 

@@ -78,7 +78,7 @@ def test_the_angle_over_its_sine():
 
 
 def test_close_to_the_edge_of_an_emitter_the_light_is_that_of_a_half_plane():
-    """Very near the edge of a perpendicular emitter, E / L tends to pi / 2, half of that of a hemisphere."""
+    """Near the edge of a perpendicular emitter, E / L tends to pi / 2, half the value of a hemisphere."""
     polygon = [emitter([(0, 0, 0), (0, 1, 0), (0, 0, 1)]), emitter([(0, 1, 1), (0, 0, 1), (0, 1, 0)])]
     for distance in (1e-2, 1e-3, 1e-4, 1e-5):
         origin = np.tile(np.float32([distance, -1e-7, 0.37]), (PACKET_WIDTH, 16, 1))

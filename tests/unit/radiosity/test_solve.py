@@ -73,7 +73,7 @@ def test_the_answer_is_that_of_a_dense_solve(albedo, open_sky):
 
 
 def coloured(matrix, rng):
-    """Return the matrix with random transmittance between patches and to the sky, and as dense (3, n, n)."""
+    """Return the matrix with random transmittance between patches and to the sky, and its dense (3, n, n)."""
     n = len(matrix.first) - 1
     shared = rng.random((n, n, 3))
     shared = (shared + shared.transpose(1, 0, 2)) / 2
@@ -236,7 +236,7 @@ def refined_solution(dense, source, albedo):
 @pytest.mark.parametrize("albedo", [0.5, 0.8, 0.99])
 @pytest.mark.parametrize("dim", [1e-3, 1e-6, 1e-11])
 def test_every_patch_has_its_light_however_bright_others_are(passage, albedo, dim):
-    """A dim room, separate from a bright one or joined with it, and a dim colour have accurate light."""
+    """Light is accurate in a dim room, separate from a bright room or joined with it, and in a dim colour."""
     matrix, dense, area = rooms(3, 30, passage, 8)
     rho = np.clip(albedo + np.random.default_rng(9).uniform(-0.05, 0.009, (90, 3)), 0, MAX_ALBEDO)
     source = np.zeros((90, 3))

@@ -75,7 +75,7 @@ def _cast(buffers, origin, direction, far, any_hit, end, kept):
 
 
 def cast(rays, n=500, far=100.0, any_hit=False):
-    """Trace rays down from z = 5. Return (x, y), end and colour factor (3,) of each traced ray, as arrays."""
+    """Trace rays down from z = 5. Return x and y (m, 2), end (m,), colour factor (m, 3) of m traced rays."""
     rng = np.random.default_rng(0)
     origin = np.float32(np.column_stack([rng.uniform(0.01, 0.99, (n, 2)), np.full(n, 5.0)]))
     end, kept = np.zeros(n, np.float32), np.zeros((n, 3), np.float32)

@@ -86,8 +86,9 @@ def ends_by_kill(work: Callable[[], object], step: int) -> bool:
 def out(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Yield an output folder with an old bake and files of the user.
 
-    The parameter selects how a new bake replaces the old one: by exchanging the two folders, without an
-    exchange, or file by file because the folder is the working directory.
+    The parameter selects how a new bake replaces the old one. Either the two folders are exchanged in one
+    step, or the files are moved one by one. The reason for the latter is that the file system cannot exchange
+    folders, or that the output folder is the working directory.
     """
     out = tmp_path / "parent" / "out"
     out.mkdir(parents=True)

@@ -127,7 +127,7 @@ def test_a_back_face_goes_only_if_its_front_shows_both_sides(tmp_path, same_mate
 
 
 def slow_duplicates(position, triangle, material, double_sided):
-    first, out = [], []  # first: (index, corners) of the first triangle at given positions
+    first, out = [], []  # first: (index, corners) of triangles without an earlier copy
     for t, row in enumerate(triangle):
         corners = [tuple(float(x) + 0.0 for x in position[v]) for v in row]
         turned = {tuple(corners[k:] + corners[:k]) for k in range(3)}
