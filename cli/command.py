@@ -14,6 +14,7 @@ from typer.core import TyperCommand
 from baker.cli.commands import COMMANDS
 from baker.cli.fields import flag_of, help_of, is_repeated, is_switch, metavar_of
 from baker.cli.flags import FlagStream
+from baker.cli.outputs import check_paths
 from baker.core.errors import SettingsError
 from baker.core.settings_model import Settings
 from baker.core.stage import Stage
@@ -185,6 +186,7 @@ class _SettingsCommand(TyperCommand):
         values = ctx.params
         given = {name: values.pop(name, None) for name in self.flag_names}
         config = given.pop("config", None)
+        check_paths(str(self.name), values, config)
         given = {name: value for name, value in given.items() if value not in (None, [], ())}
         ctx.obj = Run(
             session=session,

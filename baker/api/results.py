@@ -240,6 +240,7 @@ def render(
     """
     from baker.api.settings_of import settings_of
     from baker.core.scene import Scene
+    from baker.io.protected_files import check_outputs
     from baker.rendering.render import render as run
     from baker.rendering.settings import RenderSettings
     from baker.rendering.write import check_image, write_picture
@@ -248,6 +249,7 @@ def render(
     scene = scene if isinstance(scene, Scene) else path_of(scene, "scene", "a file or a baker.Scene")
     if out is not None:
         check_image(path_of(out, "out"), wanted.aov)
+        check_outputs({"out": Path(out)}, [Path(scene)] if isinstance(scene, str | Path) else [])
     picture = run(scene, wanted, progress)
     if out is not None:
         write_picture(Path(out), picture)

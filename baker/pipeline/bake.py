@@ -25,6 +25,7 @@ from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
 from baker.io.bake.write_bake import check_encodings, check_out, write_bake
 from baker.io.load import load_for_bake
+from baker.io.protected_files import check_outputs
 from baker.kernels.not_kept import cache_warnings
 from baker.pipeline import precompile
 from baker.pipeline.pages import TracedTexels, finish_pages
@@ -111,6 +112,7 @@ def _folder(
     check_exports(settings.export, settings.channels)
     scene_path = scene.path if isinstance(scene, Scene) else Path(scene)
     check_out(Path(out), force=force, scene_path=scene_path)
+    check_outputs({"out": Path(out)}, [] if scene_path is None else [scene_path])
     return Path(out)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from baker.core.errors import ResourceError, SettingsError
 from baker.io.output_path import resolved_output
+from baker.io.protected_files import check_outputs
 from baker.io.temporary import write_atomically
 
 
@@ -35,10 +36,7 @@ def check_fixed(out: Path, scene: Path, *, force: bool = False) -> None:
     if out.is_dir():
         raise SettingsError("this is a folder; name a .glb file", file=str(out))
     if out.exists():
-        if scene.exists() and out.samefile(scene):
-            raise SettingsError(
-                "this is the input, which is never written over; name another file", file=str(out)
-            )
+        check_outputs({"out": out}, [scene])
         if not force:
             raise SettingsError("the file exists; name another one, or add `force=True`", file=str(out))
     parent = next(p for p in resolved_output(out).parents if p.exists())
