@@ -55,6 +55,11 @@ def read_jobs(path: Path, overrides: dict[str, Any]) -> list[Job]:
     overrides : dict
         Settings from the command line; they override the settings of every job.
 
+    Returns
+    -------
+    list of Job
+        The jobs.
+
     Raises
     ------
     InputError
