@@ -1,4 +1,4 @@
-"""Input files that are not regular, are too large, or are Git LFS pointers are refused by name at once."""
+"""Inputs that are not regular files, are too large or are Git LFS pointers give an error with their name."""
 
 from __future__ import annotations
 

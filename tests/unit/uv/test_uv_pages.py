@@ -52,7 +52,7 @@ def test_too_few_pages_lower_the_density_of_all(max_pages):
     assert codes(atlas) == ["uv.density_lowered"]
     got = {layout.texels_per_metre for layout in atlas.layouts}
     assert len(got) == 1
-    # The requested density needs 5 to 6 pages. Density is proportional to the square root of the area.
+    # The requested density needs 5 to 6 pages, and density is proportional to the square root of page area.
     assert 32 * np.sqrt(max_pages / 5) * 0.75 < got.pop() < 32
 
 
