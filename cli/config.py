@@ -11,7 +11,7 @@ from baker.cli.flags import in_keys
 from baker.core.errors import SettingsError
 from baker.core.names import unknown_name
 from baker.core.settings_model import Settings
-from baker.io.regular_file import LARGEST_TEXT, read_regular
+from baker.io.toml_file import read_toml
 
 # The table whose keys may also be at the top level of the file.
 TOP_TABLE = "bake"
@@ -75,18 +75,12 @@ def _top_keys() -> Collection[str]:
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
-    import tomllib
-
     if str(path) == os.devnull:
         return {}  # by convention, a file without settings
     try:
-        return tomllib.loads(read_regular(path, most=LARGEST_TEXT).decode("utf-8-sig"))
+        return read_toml(path, "the configuration")
     except OSError as error:
         raise SettingsError(f"the configuration cannot be read: {error.strerror}", file=str(path)) from None
-    except UnicodeDecodeError:
-        raise SettingsError("the configuration is not UTF-8 text; save it as UTF-8", file=str(path)) from None
-    except tomllib.TOMLDecodeError as error:
-        raise SettingsError(f"the configuration is not valid TOML: {error}", file=str(path)) from None
 
 
 def resolve(

@@ -8,7 +8,11 @@ Based on: the OpenEXR file layout and its standard attributes (openexr.com, "Sta
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+import os
+import sys
+import threading
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -27,6 +31,12 @@ REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 
 # Largest number of components of an image. Spherical harmonics up to order 1 in three colours have 12.
 MAX_COMPONENTS = 16
+
+# Largest width and height of an image that is read, pixels.
+_LARGEST = 16384
+# File descriptor of stderr, and a lock for its replacement.
+_STDERR = 2
+_PRINTING = threading.Lock()
 
 _NAMES = {1: ("Y",), 3: ("R", "G", "B")}
 
@@ -124,14 +134,17 @@ def decode_exr(path: Path) -> DecodedImage:
     Raises
     ------
     InputError
-        If the file is missing, damaged, or has channels of different sizes.
+        If the file is missing, damaged, larger than 16384 x 16384 pixels, or has channels of different
+        sizes.
     """
     import OpenEXR
 
     if not path.is_file():
         raise InputError("there is no such file", file=str(path))
     try:
-        with OpenEXR.File(str(path), separate_channels=True) as file:
+        with _silent_library(), OpenEXR.File(str(path), header_only=True) as file:
+            _check_size(path, file.header()["dataWindow"])
+        with _silent_library(), OpenEXR.File(str(path), separate_channels=True) as file:
             planes = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
             header = {str(key): _text(value) for key, value in file.header().items() if key != "channels"}
     # OpenEXR reports damaged files as RuntimeError or ValueError.
@@ -143,6 +156,37 @@ def decode_exr(path: Path) -> DecodedImage:
     dtype = {"float16": "half", "float32": "float"}.get(str(planes[names[0]].dtype), "uint")
     pixels = np.stack([planes[name].astype(np.float32) for name in names], axis=-1)
     return DecodedImage(pixels, header, dtype, tuple(names))
+
+
+def _check_size(path: Path, window: Any) -> None:
+    """Refuse an image whose data window ((2,), (2,)), inclusive, is empty or too large to be decoded."""
+    low, high = (np.asarray(corner, np.int64) for corner in window)
+    width, height = (int(n) for n in high - low + 1)
+    if not (1 <= width <= _LARGEST and 1 <= height <= _LARGEST):
+        message = f"its size is {width} x {height} pixels; at most {_LARGEST} a side are read"
+        raise InputError(message, file=str(path))
+
+
+@contextlib.contextmanager
+def _silent_library() -> Iterator[None]:
+    """Discard what the OpenEXR library prints to stderr about damaged files; its exceptions say the same."""
+    with _PRINTING:
+        if sys.stderr is not None:
+            sys.stderr.flush()
+        try:
+            kept = os.dup(_STDERR)
+        except OSError:
+            # stderr is closed: nothing can be printed.
+            yield
+            return
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        try:
+            os.dup2(nowhere, _STDERR)
+            yield
+        finally:
+            os.dup2(kept, _STDERR)
+            os.close(kept)
+            os.close(nowhere)
 
 
 class ExrOptions(EncodingOptions):

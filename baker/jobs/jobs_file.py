@@ -18,7 +18,7 @@ from baker.core.errors import InputError, SettingsError
 from baker.core.names import unknown_name
 from baker.core.settings import BakeSettings, make_settings
 from baker.io.bake.output_folder import own_files
-from baker.io.regular_file import LARGEST_TEXT, read_regular
+from baker.io.toml_file import read_toml
 
 _TABLES = ("defaults", "job")
 _WILD = re.compile(r"[*?\[]")
@@ -91,17 +91,11 @@ def read_jobs(path: Path, overrides: dict[str, Any]) -> list[Job]:
 
 
 def _parse(path: Path) -> dict[str, Any]:
-    import tomllib
-
     try:
-        return tomllib.loads(read_regular(path, most=LARGEST_TEXT).decode("utf-8-sig"))
+        return read_toml(path, "the list of jobs")
     except OSError as error:
         why = "there is no such file" if isinstance(error, FileNotFoundError) else error.strerror
         raise InputError(f"the list of jobs cannot be read: {why}", file=str(path)) from None
-    except UnicodeDecodeError:
-        raise SettingsError("the list of jobs is not UTF-8 text; save it as UTF-8", file=str(path)) from None
-    except tomllib.TOMLDecodeError as error:
-        raise SettingsError(f"the list of jobs is not valid TOML: {error}", file=str(path)) from None
 
 
 def _check_keys(path: Path, where: str, table: dict[str, Any], own: tuple[str, ...]) -> None:

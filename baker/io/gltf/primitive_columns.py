@@ -35,7 +35,8 @@ def read_columns(source: SourceDocument, primitive: Json) -> dict[str, NDArray[n
     -------
     dict of str to (V, B) uint8
         Attribute name to the bytes of its V elements. In float attributes, except application-specific ones
-        (`_NAME`), -0 is replaced by 0. An attribute with fewer elements than POSITION is left out.
+        (`_NAME`), -0 is replaced by 0. An attribute that is malformed or has fewer elements than POSITION is
+        left out.
 
     Raises
     ------
@@ -46,7 +47,7 @@ def read_columns(source: SourceDocument, primitive: Json) -> dict[str, NDArray[n
     rows = np.arange(accessors[primitive["attributes"]["POSITION"]]["count"], dtype=np.int32)
     column = {}
     for name, index in primitive["attributes"].items():
-        if accessors[index]["count"] < len(rows):
+        if not _is_accessor(source.json, index) or accessors[index]["count"] < len(rows):
             continue
         data = gather_rows(source.json, source.buffers, index, rows)
         if accessors[index]["componentType"] == _FLOAT and not name.startswith("_"):
@@ -74,6 +75,9 @@ def why_locked(source: SourceDocument, mesh: int, primitive: Json) -> str:
     """
     document = source.json
     holder = document["meshes"][mesh]
+    malformed = _malformed(document, primitive)
+    if malformed:
+        return f"its {malformed} is malformed"
     for name in _COMPRESSED:
         if name in primitive.get("extensions", {}) or _views_have(document, primitive, name):
             return f"it is compressed with {name}"
@@ -95,6 +99,40 @@ def why_locked(source: SourceDocument, mesh: int, primitive: Json) -> str:
         if unknown:
             return f"its extension {unknown[0]} is not understood"
     return ""
+
+
+def _malformed(document: dict[str, Any], primitive: Json) -> str:
+    """Return the first member of a primitive that refers to no well-formed accessor, "" without one.
+
+    Reading a scene checks the members that a bake uses; these are all members.
+    """
+    if not isinstance(primitive.get("extensions", {}), dict):
+        return "extensions"
+    members = dict(primitive["attributes"])
+    if "indices" in primitive:
+        members["indices"] = primitive["indices"]
+    for name, index in members.items():
+        if not _is_accessor(document, index):
+            return f"member {name}"
+    return ""
+
+
+def _is_accessor(document: dict[str, Any], index: Any) -> bool:
+    """Return whether an index refers to an accessor whose count and buffer view are well-formed."""
+    accessor = _item(document.get("accessors"), index)
+    if accessor is None or not isinstance(accessor.get("count"), int):
+        return False
+    return (
+        "bufferView" not in accessor or _item(document.get("bufferViews"), accessor["bufferView"]) is not None
+    )
+
+
+def _item(items: Any, index: Any) -> Json | None:
+    """Return an object with well-formed extensions from an array of a document, None if there is none."""
+    if not isinstance(items, list) or not isinstance(index, int) or not 0 <= index < len(items):
+        return None
+    item = items[index]
+    return item if isinstance(item, dict) and isinstance(item.get("extensions", {}), dict) else None
 
 
 def _views_have(document: dict[str, Any], primitive: Json, name: str) -> bool:

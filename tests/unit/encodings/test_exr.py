@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import struct
 import zlib
 from pathlib import Path
@@ -133,3 +134,29 @@ def test_the_registry_finds_it_by_name() -> None:
     encoding = ENCODINGS.get("exr")
     assert encoding is not None
     assert encoding.suffix == ".exr"
+
+
+def test_the_library_prints_nothing_about_damaged_files(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "a.exr"
+    encode_exr(path, noise(32, 32, 3))
+    data = path.read_bytes()
+    for end in (200, len(data) // 2, len(data) - 3):
+        path.write_bytes(data[:end])
+        with pytest.raises(InputError, match="not a readable EXR"):
+            decode_exr(path)
+    os.write(2, b"still open")
+    assert capfd.readouterr().err == "still open"
+
+
+def test_a_large_size_is_refused_before_memory_is_allocated(tmp_path: Path) -> None:
+    path = tmp_path / "a.exr"
+    encode_exr(path, noise(32, 16, 3))
+    data = path.read_bytes()
+    window = struct.pack("<4i", 0, 0, 15, 31)
+    assert data.count(window) == 2
+    for box in ((0, 0, 15, 40000), (-(2**31), 0, 2**31 - 1, 31), (0, 0, 2**30, 2**30)):
+        path.write_bytes(data.replace(window, struct.pack("<4i", *box)))
+        with pytest.raises(InputError, match=r"EXR image|at most 16384 a side"):
+            decode_exr(path)

@@ -251,6 +251,33 @@ def test_attributes_that_are_too_short_and_indices_that_lead_nowhere_are_named(t
     assert after.json["meshes"] == before.json["meshes"]
 
 
+def _hostile(change):
+    """Return a box whose primitive has a custom attribute, after a change of its JSON."""
+    b = box_builder(_WEIGHT=np.zeros(36, np.float32))
+    change(b.json, b.json["meshes"][0]["primitives"][0])
+    return b
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda json, primitive: json["accessors"].__setitem__(primitive["attributes"]["_WEIGHT"], "a"),
+        lambda json, primitive: json["accessors"][primitive["attributes"]["_WEIGHT"]].pop("count"),
+        lambda json, primitive: json["accessors"][primitive["attributes"]["_WEIGHT"]].update(bufferView=99),
+        lambda json, primitive: json["accessors"][primitive["attributes"]["_WEIGHT"]].update(extensions=[1]),
+        lambda json, primitive: primitive["attributes"].update(_WEIGHT=99),
+        lambda json, primitive: primitive["attributes"].update(_WEIGHT=-1),
+        lambda json, primitive: primitive["attributes"].update(_WEIGHT="0"),
+    ],
+)
+def test_malformed_members_that_a_bake_does_not_read_are_named(change, tmp_path):
+    before, after, fixed = fix_builder(_hostile(change), tmp_path)
+    assert [left.reason.partition(": ")[2] for left in fixed.left_alone] == [
+        "its member _WEIGHT is malformed"
+    ]
+    assert after.json["meshes"] == before.json["meshes"]
+
+
 @pytest.mark.parametrize("normals", [True, False])
 @pytest.mark.parametrize("inside", ["nothing", "lamp", "skin"])
 def test_a_body_inside_out_is_turned_and_a_room_is_not(inside, normals, tmp_path):

@@ -1,0 +1,183 @@
+"""Runs `baker` on mutated input; every run must succeed or end with one clear sentence.
+
+A target writes one mutated input into a folder, runs the command through the Python API, and returns what is
+wrong, or None. An answer is wrong if it is no `BakerError`, has several lines or control characters, or if a
+NumPy warning reaches the user; and if a finished bake is not finite.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import traceback
+import warnings
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mutations import mutate_bytes, mutate_glb, mutate_json, mutate_toml
+from numpy.random import Generator
+
+import baker
+from baker.cli.config import resolve
+from baker.core.errors import BakerError
+from baker.core.settings import BakeSettings, make_settings
+from baker.io.inspect import inspect_path
+
+ROOT = Path(__file__).parents[2]
+SCENES = (
+    ROOT / "assets" / "cornell.glb",
+    ROOT / "assets" / "levels" / "warehouse.glb",
+    ROOT / "assets" / "third-party" / "kaykit-dungeon-torch" / "torch_mounted.gltf.glb",
+    ROOT / "assets" / "third-party" / "godot-living-room" / "living_room.glb",
+)
+SMALL = {"resolution": 64, "samples": 1, "bounces": 1, "threads": 1, "denoise": False}
+LONGEST_MESSAGE = 1000
+
+Target = Callable[[Path, Path, Generator], str | None]
+TARGETS: dict[str, Target] = {}
+# Number of runs that succeeded, and of those that were refused with a sentence.
+ANSWERS = Counter({"accepted": 0, "refused": 0})
+
+
+def target(function: Target) -> Target:
+    """Register a target under its function's name."""
+    TARGETS[function.__name__] = function
+    return function
+
+
+def wrong_answer(run: Callable[[], Any]) -> str | None:
+    """Call a function, and return what is wrong with its answer, None if it returns or is refused well."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            run()
+            ANSWERS["accepted"] += 1
+        except BakerError as error:
+            ANSWERS["refused"] += 1
+            text = str(error)
+            if len(text) > LONGEST_MESSAGE:
+                return f"a message of {len(text)} characters: {text[:200]!r}"
+            if any(not c.isprintable() for c in text):
+                return f"a message with control characters: {text!r}"
+        except Exception:  # every other exception is the defect that is searched for
+            return traceback.format_exc()
+    return None
+
+
+def mutated_scene(scene: Path, folder: Path, rng: Generator) -> Path:
+    """Write a mutation of a scene, and return its path."""
+    path = folder / "mutated.glb"
+    path.write_bytes(mutate_glb(scene.read_bytes(), rng))
+    return path
+
+
+@target
+def bake(scene: Path, folder: Path, rng: Generator) -> str | None:
+    """Bake a mutated scene in memory; all values must be finite."""
+    path = mutated_scene(scene, folder, rng)
+
+    def run() -> None:
+        result = baker.bake(path, **SMALL)
+        for name, lightmap in result.lightmaps.items():
+            assert np.isfinite(lightmap.value).all(), f"{name} is not finite"
+
+    return wrong_answer(run)
+
+
+@target
+def fix(scene: Path, folder: Path, rng: Generator) -> str | None:
+    """Fix a mutated scene; the written file must be readable."""
+    path = mutated_scene(scene, folder, rng)
+
+    def run() -> None:
+        baker.repair(path, folder / "fixed.glb", force=True, resolution=32, threads=1)
+        baker.load(folder / "fixed.glb")
+
+    return wrong_answer(run)
+
+
+@target
+def check(scene: Path, folder: Path, rng: Generator) -> str | None:
+    """Check a mutated scene."""
+    path = mutated_scene(scene, folder, rng)
+    return wrong_answer(lambda: baker.check(path, bake=make_settings({"resolution": 32})))
+
+
+@target
+def damaged(scene: Path, folder: Path, rng: Generator) -> str | None:
+    """Damage the manifest, an image or the scene of a bake, then verify, compare and inspect it."""
+    sound = folder / f"sound-{scene.stem}"
+    if not sound.exists():
+        baker.bake(scene, out=sound, **SMALL)
+    out = folder / "damaged"
+    shutil.rmtree(out, ignore_errors=True)
+    shutil.copytree(sound, out)
+    if rng.random() < 0.6:
+        manifest = json.loads((out / "bake.json").read_text("utf-8"))
+        text = json.dumps(mutate_json(manifest, rng))
+        (out / "bake.json").write_bytes(text.encode("utf-8", "surrogatepass"))
+    else:
+        files = sorted(p for p in out.iterdir() if p.is_file())
+        file = files[int(rng.integers(len(files)))]
+        file.write_bytes(mutate_bytes(file.read_bytes(), rng))
+    runs: tuple[Callable[[], Any], ...] = (
+        lambda: baker.verify(out, spp=1, texels=8, threads=1),
+        lambda: baker.diff(out, sound),
+        lambda: inspect_path(out),
+    )
+    return next((found for run in runs if (found := wrong_answer(run)) is not None), None)
+
+
+JOBS = """
+[defaults]
+out = "baked/{parent}/{stem}"
+resolution = 32
+quality = "preview"
+
+[[job]]
+glob = "*.glb"
+channels = ["ao"]
+
+[[job]]
+scene = ["b.glb"]
+out = "baked/b2"
+seed = 3
+encode = ["rgbm"]
+export = ["three"]
+max-pages = 8
+"""
+CONFIG = """
+[bake]
+resolution = 64
+samples = 8
+sky = [1.0, 1.0, 1.0]
+density = 12.5
+quality = "high"
+channels = ["ao", "irradiance"]
+denoise = false
+seed = 7
+bounces = 3
+include = ["a*", "b"]
+"""
+
+
+@target
+def jobs(scene: Path, folder: Path, rng: Generator) -> str | None:
+    """Read a mutated jobs file."""
+    for name in ("a.glb", "b.glb"):
+        if not (folder / name).exists():
+            shutil.copy(scene, folder / name)
+    path = folder / "jobs.toml"
+    path.write_bytes(mutate_toml(JOBS, rng))
+    return wrong_answer(lambda: baker.batch(path, dry_run=True))
+
+
+@target
+def config(scene: Path, folder: Path, rng: Generator) -> str | None:
+    """Read a mutated config file of `bake`."""
+    path = folder / "baker.toml"
+    path.write_bytes(mutate_toml(CONFIG, rng))
+    return wrong_answer(lambda: resolve([BakeSettings], {}, path))

@@ -1,0 +1,44 @@
+"""A few random mutations for each target; `tests/fuzz/run.py` runs many.
+
+With NUMBA_BOUNDSCHECK=1 (and a NUMBA_CACHE_DIR of its own) kernels are compiled with checked indices, and
+other seeds are used.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+import pytest
+from numba.core.errors import NumbaError
+from targets import ANSWERS, SCENES, TARGETS
+
+from baker.trace.jit import kernel
+
+CHECKED = bool(numba.config.BOUNDSCHECK)
+SEEDS = range(100_000, 100_040) if CHECKED else range(12)
+# Targets that read text files only run more mutations, on one scene.
+TEXT = {"config": 100, "jobs": 40}
+CASES = [(name, scene) for name in TARGETS for scene in range(1 if name in TEXT else len(SCENES))]
+
+
+@pytest.mark.parametrize(("name", "scene"), CASES, ids=[f"{n}-{SCENES[k].stem[:9]}" for n, k in CASES])
+def test_mutations_are_baked_or_refused_with_a_sentence(name, scene, tmp_path):
+    before = ANSWERS.copy()
+    for seed in range(TEXT[name]) if name in TEXT else SEEDS:
+        found = TARGETS[name](SCENES[scene], tmp_path, np.random.default_rng(seed))
+        assert found is None, f"python tests/fuzz/run.py {name} --scene {scene} --only {seed}\n{found}"
+    # Mutations that are all refused, or never, test little.
+    assert ANSWERS["accepted"] > before["accepted"]
+    assert ANSWERS["refused"] > before["refused"]
+
+
+@kernel
+def _item(values, k):
+    return values[k]
+
+
+@pytest.mark.skipif(not CHECKED, reason="needs NUMBA_BOUNDSCHECK=1")
+def test_kernels_check_indices():
+    assert _item(np.arange(3.0), 2) == 2.0
+    with pytest.raises((IndexError, NumbaError)):
+        _item(np.arange(3.0), 3)
