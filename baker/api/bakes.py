@@ -159,6 +159,7 @@ def ao(
     settings: BakeSettings | None = None,
     *,
     out: str | Path | None = None,
+    atlas: Atlas | None = None,
     force: bool = False,
     progress: Progress = silent,
     **keywords: Unpack[AoKeywords],
@@ -173,6 +174,9 @@ def ao(
         Settings of the bake; `channels` is ignored.
     out : str or Path, optional
         Folder to write; None keeps the result in memory.
+    atlas : Atlas, optional
+        Lightmap uv of the scene, a result of `unwrap` for the same Scene. Its resolution and padding replace
+        those of the settings.
     force : bool
         Replace `out` even if baker did not write it.
     progress : Progress
@@ -203,14 +207,17 @@ def ao(
     ['ao']
     """
     from baker.api.settings_of import settings_of
+    from baker.core.atlas import Atlas
     from baker.core.scene import Scene
     from baker.core.settings import BakeSettings
     from baker.pipeline.bake import bake as run
 
     wanted = settings_of(BakeSettings, settings, {**keywords, "channels": "ao"})
     scene = scene if isinstance(scene, Scene) else path_of(scene, "scene", "a file or a baker.Scene")
+    if atlas is not None:
+        atlas = instance_of(atlas, Atlas, "atlas", "; baker.unwrap makes one")
     out = None if out is None else path_of(out, "out")
-    return run(scene, settings=wanted, out=out, progress=progress, force=force)
+    return run(scene, settings=wanted, out=out, progress=progress, force=force, atlas=atlas)
 
 
 @of_the_api

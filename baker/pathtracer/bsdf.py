@@ -117,14 +117,10 @@ def bsdf_cosines(row, lane, nv, nl, vl, out):
 
 
 @inner
-def bsdf_pdf(row, lane, vx, vy, vz, lx, ly, lz):
-    """Return the density per steradian with which `bsdf_sample` samples l, without mirror reflections."""
-    return cosines_pdf(row, lane, vz, lz, vx * lx + vy * ly + vz * lz)
-
-
-@inner
 def cosines_pdf(row, lane, nv, nl, vl):
-    """Return the density of `bsdf_pdf` from the cosines nv = n.v, nl = n.l and vl = v.l.
+    """Return the density per steradian with which `bsdf_sample` samples l, without mirror reflections.
+
+    nv, nl, vl : cosines n.v, n.l and v.l
 
     row : (5, n) float64, parameters
     """

@@ -90,6 +90,10 @@ class RenderSettings(Settings):
         # The property raises an error for a wrong sky.
         self.sky_radiance  # noqa: B018
         if self.estimator != "mis":
+            if self.ao or self.lightmap is not None:
+                other = "`ao`" if self.ao else "`lightmap`"
+                message = f"`estimator` chooses how paths are traced; {other} traces none"
+                raise SettingsError(message, object="estimator")
             from baker.pathtracer.estimators import estimator_named
 
             estimator_named(self.estimator)

@@ -10,12 +10,14 @@ import sys
 import time
 from pathlib import Path
 from types import SimpleNamespace
+from typing import get_args
 
 import pytest
 
 from baker.cli.app import run
 from baker.cli.progress import Reporter
-from baker.core.errors import Cancelled, InputError
+from baker.core.encoding import encoding_options
+from baker.core.errors import Cancelled, InputError, SettingsError
 from baker.core.settings import BakeSettings
 from baker.io.bake.lock import OutputLock
 
@@ -67,7 +69,23 @@ def bake_words(tmp_path, *more):
     return ("bake", "scene.glb", "-o", tmp_path / "out", *more)
 
 
-# {setting: a value other than the default}; the test below fails if a setting is missing.
+def other_option(model, name):
+    """Return (text, value) of an encoding's option: the first accepted value that is not the default."""
+    field = model.model_fields[name]
+    if field.annotation is bool:
+        return None, not field.default
+    for value in (*get_args(field.annotation), 8, 0.5, 1, "8"):
+        try:
+            made = getattr(model.make({name: value}), name)
+        except SettingsError:
+            continue
+        if made != field.default:
+            return str(value), made
+    raise AssertionError(f"no known value is accepted by {name}")
+
+
+# {setting: (text, value)} with a value other than the default. A missing setting fails the test below; those
+# of encodings are added, so that an encoding is a single file.
 OTHER = {
     "allow_outside": (None, True),
     "channels": ("ao", ("ao",)),
@@ -86,10 +104,7 @@ OTHER = {
     "sky_strength": ("2", 2.0),
     "bounces": ("0", 0),
     "denoise": (None, False),
-    "dtype": ("float", "float"),
-    "exr_compression": ("piz", "piz"),
     "encode": ("hdr,png16", ("hdr", "png16")),
-    "rgbm_range": ("8", "8"),
     "export": ("three,unity", ("three", "unity")),
     "include": ("Wall*,House/*", ("Wall*", "House/*")),
     "exclude": ("UCX_*", ("UCX_*",)),
@@ -97,7 +112,7 @@ OTHER = {
     "scale": ("0.01", 0.01),
     "seed": ("7", 7),
     "threads": ("1", 1),
-}
+} | {name: other_option(model, name) for model in encoding_options().values() for name in model.model_fields}
 
 
 def test_every_setting_has_a_flag_that_arrives(pipeline, command, tmp_path):

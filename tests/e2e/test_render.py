@@ -207,6 +207,8 @@ def test_no_camera_is_one_sentence_with_a_view_that_works(emissive, tmp_path):
         (["--time-limit", "nan"], "--time-limit"),
         (["--max-depth", "0"], "--max-depth"),
         (["--max-depth", "2", "--ao"], "--max-depth"),
+        (["--estimator", "bdpt", "--ao"], "--ao traces none"),
+        (["--estimator", "bdpt", "--lightmap", "x"], "--lightmap traces none"),
         (["--estimator", "mos"], "did you mean 'mis'"),
         (["--aov", "colour"], "no AOV 'colour'"),
         (["--ao", "--ao-distance", "-1"], "--ao-distance"),

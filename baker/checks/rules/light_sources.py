@@ -208,16 +208,17 @@ def albedo(context: CheckContext) -> Iterator[RawFinding]:
 def albedos(context: CheckContext) -> NDArray[np.float64]:
     """Return the albedo of each material, (M,) float64: its largest colour component, 0 if it is not used.
 
-    It is an upper bound, base colour factor times brightest vertex colour. If this exceeds `MOST_REFLECTED`
-    and the material has a base colour texture, it is replaced by factor times mean texture colour.
+    It is an upper bound: base colour factor times brightest vertex colour. If this exceeds `MOST_REFLECTED`
+    and the material has a base colour texture, it is multiplied by the mean texture colour.
     """
     out = np.zeros(len(context.scene.materials))
     for k in context.used_materials:
         material = context.scene.materials[k]
-        out[k] = max(material.base_colour[:3]) * _painted(context, k)
+        painted = _painted(context, k)
+        out[k] = max(material.base_colour[:3]) * painted
         if material.base_colour_texture is not None and out[k] > MOST_REFLECTED:
             mean = image_mean(material.base_colour_texture.image)
-            out[k] = max(a * b for a, b in zip(material.base_colour[:3], mean, strict=True))
+            out[k] = max(a * b for a, b in zip(material.base_colour[:3], mean, strict=True)) * painted
     return out
 
 

@@ -6,7 +6,7 @@ from inner import compiled
 from numba import njit
 from scipy import stats
 
-from baker.pathtracer.bsdf import bsdf_eval, bsdf_pdf, bsdf_sample
+from baker.pathtracer.bsdf import bsdf_eval, bsdf_sample, cosines_pdf
 
 (bsdf_eval,) = compiled(bsdf_eval)
 
@@ -49,7 +49,8 @@ def draw_many(row, vx, vy, vz, random):
 def density_of(row, vx, vy, vz, way):
     out = np.zeros(len(way))
     for i in range(len(way)):
-        out[i] = bsdf_pdf(row, 0, vx, vy, vz, way[i, 0], way[i, 1], way[i, 2])
+        along = vx * way[i, 0] + vy * way[i, 1] + vz * way[i, 2]
+        out[i] = cosines_pdf(row, 0, vz, way[i, 2], along)
     return out
 
 
