@@ -10,6 +10,8 @@ import re
 from functools import cache
 from typing import Any, TextIO
 
+from baker.core.printable import printable_lines
+
 _NAMED = re.compile(r"`([a-z][a-z0-9_]*)(?:=([^`\s]+))?`")
 # Arguments of subcommands that have a flag but are not settings.
 _ARGUMENTS = frozenset({
@@ -118,7 +120,7 @@ class FlagStream:
 
     def write(self, text: str) -> int:
         """Write a text in which settings between backticks are converted to flags."""
-        return self._stream.write(in_flags(text))
+        return self._stream.write(in_flags(printable_lines(text)))
 
     def flush(self) -> None:
         """Flush the stream."""

@@ -8,6 +8,7 @@ from typing import Annotated, Any, TextIO
 import typer
 
 from baker.cli.command import Run, command
+from baker.core.printable import printable
 from baker.core.settings import InspectSettings
 
 # Largest number of items shown of a list without -v and --json. The number of further items is printed.
@@ -55,9 +56,13 @@ def write_tree(value: Any, stream: TextIO, *, depth: int = 0, limit: int | None 
     if isinstance(value, dict):
         for key, item in value.items():
             if _plain(item):
-                stream.write(f"{pad}{key}: {_words(item)}\n")
+                stream.write(f"{pad}{printable(str(key))}: {_words(item)}\n")
             else:
-                stream.write(f"{pad}{key} ({len(item)}):\n" if isinstance(item, list) else f"{pad}{key}:\n")
+                stream.write(
+                    f"{pad}{printable(str(key))} ({len(item)}):\n"
+                    if isinstance(item, list)
+                    else f"{pad}{printable(str(key))}:\n"
+                )
                 write_tree(item, stream, depth=depth + 1, limit=limit)
         return
     rows = value[:limit]
@@ -110,4 +115,4 @@ def _words(value: Any) -> str:
         return f"{value:.6g}"
     if isinstance(value, list | tuple):
         return " ".join(_words(part) for part in value)
-    return str(value)
+    return printable(str(value))

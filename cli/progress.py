@@ -9,6 +9,8 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TextIO
 
+from baker.core.printable import printable
+
 if TYPE_CHECKING:
     from rich.progress import Progress as RichProgress
 
@@ -68,7 +70,7 @@ class Reporter:
         if not self._quiet:
             # Use a lock, because several threads report the progress of their tiles.
             with self._lock:
-                self._show(stage, min(max(fraction, 0.0), 1.0), detail)
+                self._show(stage, min(max(fraction, 0.0), 1.0), printable(detail))
         return self._stopped()
 
     def _show(self, stage: str, fraction: float, detail: str) -> None:
@@ -99,7 +101,7 @@ def _make_bar(stream: TextIO) -> RichProgress:
         TextColumn("{task.description:<14}"),
         BarColumn(),
         TaskProgressColumn(),
-        TextColumn("{task.fields[detail]}"),
+        TextColumn("{task.fields[detail]}", markup=False),
         TimeRemainingColumn(),
         console=Console(file=stream),
         transient=True,

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from baker.core.printable import message_line
+
 # Severities in ascending order. The index is the rank.
 SEVERITIES = ("info", "warning", "error")
 # Largest number of faces or face pairs that one finding lists.
@@ -65,6 +67,10 @@ class RawFinding:
     position: tuple[float, float, float] | None = None
     severity: str | None = None
     more: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Make the message one printable line."""
+        object.__setattr__(self, "message", message_line(self.message))
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ A message is one sentence that says what was found, in which file and object, an
 
 from __future__ import annotations
 
-from baker.core.printable import printable
+from baker.core.printable import message_line, printable
 
 
 class BakerError(Exception):
@@ -26,7 +26,7 @@ class BakerError(Exception):
 
     def __init__(self, message: str, *, file: str | None = None, object: str | None = None) -> None:
         # Convert all three texts to one line, because they may contain names from a file.
-        message = printable(message)
+        message = message_line(message)
         super().__init__(message)
         self.message = message
         self.file = None if file is None else printable(file)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 
 # Largest length of a value from a file in a message, characters.
@@ -12,6 +13,8 @@ _JOINERS = "\u200c\u200d\u00ad"
 # Unicode categories of escaped characters: control characters, surrogates, line separators, paragraph
 # separators, and format characters, some of which reverse the direction of text.
 _ESCAPED = frozenset({"Cc", "Cs", "Zl", "Zp", "Cf"})
+# A long value between quotes that is no path; the apostrophe of a genitive does not begin one.
+_QUOTED = re.compile(rf"(?<!\w)'([^'/\\]{{{LONGEST_VALUE + 1},}})'(?!\w)")
 
 
 def printable(text: str) -> str:
@@ -51,9 +54,44 @@ def shortened(text: str, most: int = LONGEST_VALUE) -> str:
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
+def message_line(text: str) -> str:
+    """Return a message in one printable line, with long quoted values cut; see `shortened`.
+
+    Parameters
+    ----------
+    text : str
+        The message. Values of a file are between single quotes; paths are not cut.
+
+    Returns
+    -------
+    str
+        The same object if nothing had to be replaced.
+    """
+    return _QUOTED.sub(lambda found: f"'{shortened(found[1])}'", printable(text))
+
+
+def printable_lines(text: str) -> str:
+    """Return a text of several lines, each of them made `printable`.
+
+    Parameters
+    ----------
+    text : str
+        Lines, separated by line feeds.
+
+    Returns
+    -------
+    str
+        The same number of lines.
+    """
+    if text.isascii() and text.replace("\n", "").isprintable():
+        return text
+    return "\n".join(map(printable, text.split("\n")))
+
+
 def _shown(letter: str) -> str:
     if letter in "\n\r\t":
         return " "
-    if letter in _JOINERS or unicodedata.category(letter) not in _ESCAPED:
+    # The last two characters of each plane are none, and XML forbids two of them.
+    if letter in _JOINERS or not (unicodedata.category(letter) in _ESCAPED or ord(letter) & 0xFFFE == 0xFFFE):
         return letter
     return letter.encode("unicode_escape", "surrogatepass").decode("ascii")

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.printable import printable
+
 # Longest side of a picture in a notebook, pixels.
 THUMBNAIL = 256
 
@@ -40,7 +42,8 @@ class Result:
 
     def _repr_html_(self) -> str:
         rows = "".join(
-            f"<tr><th style='text-align:left'>{escape(str(name))}</th><td>{escape(_words(value))}</td></tr>"
+            f"<tr><th style='text-align:left'>{escape(str(name))}</th>"
+            f"<td>{escape(printable(_words(value)))}</td></tr>"
             for name, value in self.summary().items()
         )
         picture = self.picture()

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.origin import scene_origin
+from baker.core.printable import message_line
 from baker.core.result import Result
 from baker.core.source_mesh import SourceScene
 
@@ -214,6 +215,10 @@ class SceneWarning:
     code: str
     message: str
     object: str = ""
+
+    def __post_init__(self) -> None:
+        """Make the message one printable line."""
+        object.__setattr__(self, "message", message_line(self.message))
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
+from baker.core.printable import printable, printable_lines
 from baker.io.temporary import write_atomically
 
 
@@ -63,12 +64,12 @@ def junit_text(suite: str, cases: Sequence[Case]) -> str:
     root = ElementTree.Element("testsuites", counts)
     node = ElementTree.SubElement(root, "testsuite", {"name": suite, **counts})
     for case in cases:
-        entry = ElementTree.SubElement(
-            node, "testcase", {"name": case.name, "classname": case.group, "time": f"{case.seconds:.3f}"}
-        )
+        names = {"name": printable(case.name), "classname": printable(case.group)}
+        entry = ElementTree.SubElement(node, "testcase", {**names, "time": f"{case.seconds:.3f}"})
         if case.problem:
             kind = "error" if case.error else "failure"
-            ElementTree.SubElement(entry, kind, {"message": case.problem}).text = case.problem
+            problem = ElementTree.SubElement(entry, kind, {"message": printable(case.problem)})
+            problem.text = printable_lines(case.problem)
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.printable import printable
 from baker.io.junit import write_text
 from baker.io.png import encode_png, srgb_levels
 from baker.metrics.error_metrics import dark_floor, relative_error
@@ -31,6 +32,10 @@ td:first-child,th:first-child{text-align:left}
 img{image-rendering:pixelated;background:#000;margin-right:.6rem}
 figure{display:inline-block;margin:.5rem 1rem .5rem 0}figcaption{font-size:13px;color:#555}
 .bad{color:#b00020;font-weight:600}.good{color:#187a2f;font-weight:600}"""
+
+
+def _escaped(text: str) -> str:
+    return html.escape(printable(text))
 
 
 def write_report(path: Path, found: VerifyReport) -> None:
@@ -55,7 +60,7 @@ def report_html(found: VerifyReport) -> str:
     """Return the HTML page as text."""
     summary = found.to_dict()
     verdict = '<span class="good">passed</span>' if found.passed else '<span class="bad">failed</span>'
-    scene = html.escape(str(found.bake.manifest.get("input", {}).get("path") or found.bake.folder.name))
+    scene = _escaped(str(found.bake.manifest.get("input", {}).get("path") or found.bake.folder.name))
     parts = [
         f"<h1>{scene}: {verdict}</h1>",
         f"<p>{len(found.pixel)} texels, {found.rays / 1e6:.1f} million rays, {found.seconds:.0f} s,"
@@ -67,7 +72,7 @@ def report_html(found: VerifyReport) -> str:
         _metrics_table(found),
     ]
     for name, check in found.channels.items():
-        parts.append(f"<h2>{html.escape(name)}</h2>")
+        parts.append(f"<h2>{_escaped(name)}</h2>")
         parts.append(_pages(found, name, check))
         parts.append(_histogram(summary["channels"][name]["z_histogram"]))
     parts += [_crops(found), _worst_table(found), _objects_table(found)]
@@ -85,7 +90,7 @@ def _failures(found: VerifyReport) -> str:
         if verdict.failed
     ]
     lines += found.problems + [warning.message for warning in found.warnings]
-    items = "".join(f'<li class="bad">{html.escape(line)}</li>' for line in lines)
+    items = "".join(f'<li class="bad">{_escaped(line)}</li>' for line in lines)
     return f"<ul>{items}</ul>" if lines else ""
 
 
@@ -93,7 +98,7 @@ def _limits_table(found: VerifyReport) -> str:
     rows = ""
     for verdict in found.verdicts:
         words = '<td class="bad">failed</td>' if verdict.failed else '<td class="good">holds</td>'
-        rows += f"<tr><td>{html.escape(str(verdict.limit))}</td><td>{_number(verdict.value)}</td>{words}</tr>"
+        rows += f"<tr><td>{_escaped(str(verdict.limit))}</td><td>{_number(verdict.value)}</td>{words}</tr>"
     head = "<tr><th>fails if</th><th>figure</th><th></th></tr>"
     note = "<p>These limits decide, and no others: a single texel may be far off in a bake that passed.</p>"
     return f"<h2>Limits</h2>{note}<table>{head}{rows}</table>"
@@ -105,8 +110,8 @@ def _regions_table(found: VerifyReport) -> str:
         colour = " ".join(f"{shift:+.1%}" for shift in row["colour"])
         where = ", ".join(f"{x:.2f}" for x in row["position"])
         rows += (
-            f"<tr><td>{row['channel']} of {html.escape(row['region'])}<br>around {where}, of"
-            f" {html.escape(', '.join(row['objects']))}</td><td>{row['texels']}</td>"
+            f"<tr><td>{row['channel']} of {_escaped(row['region'])}<br>around {where}, of"
+            f" {_escaped(', '.join(row['objects']))}</td><td>{row['texels']}</td>"
             f"<td>{row['area']:.3g}</td><td>{row['light']:.4g}</td>"
             f"<td>{row['bias']:+.1%} &plusmn; {row['bias_se']:.1%}</td><td>{colour}</td>"
             f"<td>{row['typical']:.1%} ({row['typical_noise']:.1%})</td></tr>"
@@ -124,7 +129,7 @@ def _regions_table(found: VerifyReport) -> str:
 
 def _metrics_table(found: VerifyReport) -> str:
     # Write one row for each metric, because a column for each metric would be too wide.
-    head = "".join(f"<th>{html.escape(name)}</th>" for name in found.channels)
+    head = "".join(f"<th>{_escaped(name)}</th>" for name in found.channels)
     rows = ""
     for key in METRIC_NAMES:
         cells = "".join(f"<td>{_number(check.metrics[key])}</td>" for check in found.channels.values())
@@ -187,8 +192,8 @@ def _shown(image: NDArray[np.float32], middle: float) -> NDArray[np.uint8]:
 def _figure(pixels: NDArray[np.uint8], caption: str, zoom: int) -> str:
     data = base64.b64encode(encode_png(np.ascontiguousarray(pixels))).decode("ascii")
     width = pixels.shape[1] * zoom
-    picture = f'<img width="{width}" alt="{html.escape(caption)}" src="data:image/png;base64,{data}">'
-    return f"<figure>{picture}<figcaption>{html.escape(caption)}</figcaption></figure>"
+    picture = f'<img width="{width}" alt="{_escaped(caption)}" src="data:image/png;base64,{data}">'
+    return f"<figure>{picture}<figcaption>{_escaped(caption)}</figcaption></figure>"
 
 
 def _histogram(histogram: dict[str, list[float]]) -> str:
@@ -232,7 +237,7 @@ def _worst_table(found: VerifyReport) -> str:
         position = ", ".join(f"{x:.3f}" for x in entry["position"])
         value, truth = (" ".join(f"{x:.4g}" for x in entry[key]) for key in ("value", "reference"))
         rows += (
-            f"<tr><td>{html.escape(entry['object'])}</td><td>{entry['node']}</td><td>{entry['channel']}</td>"
+            f"<tr><td>{_escaped(entry['object'])}</td><td>{entry['node']}</td><td>{entry['channel']}</td>"
             f"<td>{entry['page']}, {entry['row']}, {entry['column']}</td><td>{position}</td><td>{value}</td>"
             f"<td>{truth}</td><td>{entry['error']:.1%}</td></tr>"
         )
@@ -245,7 +250,7 @@ def _objects_table(found: VerifyReport) -> str:
     shown = ("texels", "bias", "median", "p95", "noise_floor")
     rows = ""
     for entry in found.objects:
-        name = f"<tr><td>{html.escape(entry['object'])}</td><td>{entry['node']}</td>"
+        name = f"<tr><td>{_escaped(entry['object'])}</td><td>{entry['node']}</td>"
         for channel, values in entry["channels"].items():
             cells = "".join(f"<td>{_number(values[key])}</td>" for key in shown)
             rows += f"{name}<td>{channel}</td>{cells}</tr>"

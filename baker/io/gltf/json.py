@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any, NoReturn
 
 from baker.core.errors import InputError
+from baker.core.printable import printable
 
 
 class JsonObject:
@@ -109,7 +110,8 @@ class JsonObject:
         value = self._get(key, default)
         if not isinstance(value, str):
             self.fail(f"expected a string, found {_show(value)}", key)
-        return value
+        # Names are printed, written to reports and to files of engines; a lone surrogate fits into no file.
+        return printable(value) if key == "name" else value
 
     def strings(self, key: str) -> list[str]:
         """Return a list of strings (empty if absent)."""

@@ -10,6 +10,7 @@ import hashlib
 import math
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from baker.core.colour import linear_from_srgb
 from baker.core.errors import IndexRangeError, InputError
+from baker.core.printable import printable
 from baker.core.scene import Material, Scene, SceneWarning
 from baker.core.source_mesh import SourcePrimitive
 from baker.io.images import decode_image
@@ -63,13 +65,15 @@ def import_obj(source: SceneFile) -> Scene:
     )
     groups: list[tuple[str, list[SourcePrimitive]]] = []
     for number, shape in enumerate(reader.GetShapes()):
-        name = shape.name or f"shape_{number}"
+        name = printable(shape.name) or f"shape_{number}"
         groups.append((name, _primitives(shape.mesh, corners, len(materials))))
     if any(p.material == len(materials) for _, primitives in groups for p in primitives):
         if materials:
             message = f"faces without a known material are grey; MTL names {len(materials)}"
             warnings.append(SceneWarning("no-material", message, source.path.name))
         materials.append(GREY)
+    # The parser has matched materials by the names of the file.
+    materials = [replace(material, name=printable(material.name)) for material in materials]
     return scene_of_meshes(source, groups, materials, warnings, digest.hexdigest())
 
 
