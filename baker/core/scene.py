@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.origin import scene_origin
-from baker.core.printable import message_line
+from baker.core.printable import message_line, printable
 from baker.core.result import Result
 from baker.core.source_mesh import SourceScene
 
@@ -217,8 +217,9 @@ class SceneWarning:
     object: str = ""
 
     def __post_init__(self) -> None:
-        """Make the message one printable line."""
+        """Make message and object printable lines."""
         object.__setattr__(self, "message", message_line(self.message))
+        object.__setattr__(self, "object", printable(self.object))
 
 
 @dataclass(frozen=True)
