@@ -28,6 +28,7 @@ from baker.io.bake.read_bake import StoredBake
 from baker.viewer.page_data import page_numbers
 from baker.viewer.scene_data import scene_data
 from baker.viewer.script import ThreeScript
+from baker.viewer.strict_http import fault_of_request
 
 HOST = "127.0.0.1"
 STATIC = Path(__file__).resolve().parent / "static"
@@ -148,9 +149,40 @@ def _file(path: Path) -> Answer:
     return _MIME.get(path.suffix.lower(), _BYTES), path.read_bytes
 
 
+class _Recorder:
+    """A stream that keeps the lines read from it."""
+
+    def __init__(self, stream: Any) -> None:
+        self.stream = stream
+        self.lines: list[bytes] = []
+
+    def readline(self, limit: int = -1) -> bytes:
+        """Read a line."""
+        line: bytes = self.stream.readline(limit)
+        self.lines.append(line)
+        return line
+
+
 class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     server: ViewServer
+
+    def parse_request(self) -> bool:
+        """Parse the request as the base class does; refuse one that is ambiguous, and end its connection."""
+        stream = self.rfile
+        recorder = _Recorder(stream)
+        self.rfile = recorder  # type: ignore[assignment]
+        try:
+            parsed = super().parse_request()
+        finally:
+            self.rfile = stream
+        if not parsed:
+            return False
+        why = fault_of_request(self.raw_requestline, recorder.lines[:-1], self.server.names)
+        if why is not None:
+            self.close_connection = True
+            self._send(HTTPStatus.BAD_REQUEST, "text/plain", f"{why}\n".encode(), body=self.command != "HEAD")
+        return why is None
 
     def do_GET(self) -> None:
         self._answer(body=True)
