@@ -166,6 +166,8 @@ class _Recorder:
 class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     server: ViewServer
+    # Set by the base class, which its stubs do not say.
+    raw_requestline: bytes
 
     def parse_request(self) -> bool:
         """Parse the request as the base class does; refuse one that is ambiguous, and end its connection."""
