@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -105,6 +106,17 @@ def test_no_file_is_long():
     }
     assert {name: lines for name, lines in found.items() if lines > 500} == {}
     assert len(found) > 60
+
+
+def test_no_two_classes_have_one_name():
+    found = Counter(
+        node.name
+        for path in sources("baker")
+        for node in ast.parse(path.read_text("utf-8")).body
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
+    )
+    assert {name: count for name, count in found.items() if count > 1} == {}
+    assert len(found) > 100
 
 
 def test_no_two_tests_have_one_name():

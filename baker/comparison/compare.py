@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.comparison.manifests import manifest_differences
-from baker.comparison.match import Sides, SurfacePoints, make_sides, match
+from baker.comparison.match import ComparedSurfaces, TrianglePoints, make_sides, match
 from baker.comparison.pairs import pair_objects
 from baker.comparison.pictures import FlipMeans, page_flip, read
 from baker.comparison.settings import DiffSettings
@@ -215,7 +215,7 @@ def compare(
     )
 
 
-def _owners(bake: StoredBake, sides: Sides) -> NDArray[np.int32]:
+def _owners(bake: StoredBake, sides: ComparedSurfaces) -> NDArray[np.int32]:
     """Return (P, H, W) int32: the instance of each texel of a that may be compared, -1 for other texels."""
     owner = instance_map(sides.a, bake.atlas.n_pages, bake.atlas.resolution)
     covered = np.isin(bake.status, (TexelStatus.COVERED, TexelStatus.UNCONVERGED))
@@ -223,8 +223,8 @@ def _owners(bake: StoredBake, sides: Sides) -> NDArray[np.int32]:
 
 
 def _choose(
-    bake: StoredBake, sides: Sides, owner: NDArray[np.int32], name: str, settings: DiffSettings
-) -> tuple[NDArray[np.int64], SurfacePoints, SurfacePoints, NDArray[np.int64]]:
+    bake: StoredBake, sides: ComparedSurfaces, owner: NDArray[np.int32], name: str, settings: DiffSettings
+) -> tuple[NDArray[np.int64], TrianglePoints, TrianglePoints, NDArray[np.int64]]:
     """Choose texels of bake a that have a matching surface point in bake b.
 
     Returns the texels (n,) as (page * H + row) * W + column, their points on a and on b, and for each
@@ -234,7 +234,7 @@ def _choose(
     brightness = bake.maps[name].mean(axis=3, dtype=np.float64).reshape(-1)
     owner = owner.reshape(-1)
     pixel = choose_texels(owner, owner >= 0, brightness, settings.texels, settings.seed)
-    points = SurfacePoints(*one_surface_point(sides.a, pixel, bake.atlas.resolution, settings.seed))
+    points = TrianglePoints(*one_surface_point(sides.a, pixel, bake.atlas.resolution, settings.seed))
     other = match(sides, points)
     met = other.triangle >= 0
     lost = np.bincount(sides.a.instance[points.triangle[~met]], minlength=len(bake.scene.instances))
@@ -283,9 +283,9 @@ def _add_texels_of_b(
     worst: list[dict[str, Any]],
     a: StoredBake,
     b: StoredBake,
-    sides: Sides,
+    sides: ComparedSurfaces,
     pixel: NDArray[np.int64],
-    other: SurfacePoints,
+    other: TrianglePoints,
 ) -> None:
     """Add to each entry of `worst` the texel of bake b at the same surface point, as `in_b`."""
     size_a, size_b = a.atlas.resolution, b.atlas.resolution

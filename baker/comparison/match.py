@@ -36,7 +36,7 @@ _PRESENT = 0.5
 
 
 @dataclass(frozen=True)
-class SurfacePoints:
+class TrianglePoints:
     """n points on the triangles of a geometry.
 
     Attributes
@@ -50,9 +50,9 @@ class SurfacePoints:
     triangle: NDArray[np.int64]
     weight: NDArray[np.float64]
 
-    def __getitem__(self, which: NDArray[np.bool_]) -> SurfacePoints:
+    def __getitem__(self, which: NDArray[np.bool_]) -> TrianglePoints:
         """Return the points that the mask `which` (n,) selects."""
-        return SurfacePoints(self.triangle[which], self.weight[which])
+        return TrianglePoints(self.triangle[which], self.weight[which])
 
     def at(self, geometry: Geometry, name: str) -> NDArray[np.float64]:
         """Return a vertex attribute at the points, (n, k) float64; `name` is "position" or "uv"."""
@@ -61,7 +61,7 @@ class SurfacePoints:
 
 
 @dataclass(frozen=True)
-class Sides:
+class ComparedSurfaces:
     """The surfaces of bakes a and b, and the pairs of their objects; I is the number of instances of a bake.
 
     Attributes
@@ -84,9 +84,11 @@ class Sides:
     missing_b: NDArray[np.bool_]
 
 
-def make_sides(a: Geometry, b: Geometry, scene_a: Scene, scene_b: Scene, pairs: ObjectPairs) -> Sides:
+def make_sides(
+    a: Geometry, b: Geometry, scene_a: Scene, scene_b: Scene, pairs: ObjectPairs
+) -> ComparedSurfaces:
     """Find the objects that exist in one bake only, and return them with both surfaces."""
-    return Sides(
+    return ComparedSurfaces(
         a,
         b,
         _mirrored(scene_a),
@@ -97,7 +99,7 @@ def make_sides(a: Geometry, b: Geometry, scene_a: Scene, scene_b: Scene, pairs: 
     )
 
 
-def match(sides: Sides, points: SurfacePoints) -> SurfacePoints:
+def match(sides: ComparedSurfaces, points: TrianglePoints) -> TrianglePoints:
     """Return the points on the surface of b that match `points`, which lie on the surface of a.
 
     The triangle of a result is -1 if b has no matching surface.
@@ -125,7 +127,7 @@ def match(sides: Sides, points: SurfacePoints) -> SurfacePoints:
         max_distance = _max_distance(a, np.isin(a.instance, pairs.rest_a))
         found = _near(sides.b, wanted, *_ray_starts(a, points[some]), max_distance)
         triangle[some], weight[some] = found.triangle, found.weight
-    return SurfacePoints(triangle, weight)
+    return TrianglePoints(triangle, weight)
 
 
 def _mirrored(scene: Scene) -> NDArray[np.bool_]:
@@ -137,7 +139,9 @@ def _first(geometry: Geometry) -> NDArray[np.int64]:
     return np.searchsorted(geometry.instance, np.arange(count)).astype(np.int64)
 
 
-def _ray_starts(geometry: Geometry, points: SurfacePoints) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _ray_starts(
+    geometry: Geometry, points: TrianglePoints
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     normal = geometry.face_normal[points.triangle].astype(np.float64)
     return points.at(geometry, "position"), normal
 
@@ -165,7 +169,7 @@ def _missing(
     wanted = np.flatnonzero(np.isin(other.instance, other_rest))
     if not len(mine) or not len(wanted):
         return missing
-    centroid = SurfacePoints(mine, np.full((len(mine), 3), 1 / 3))
+    centroid = TrianglePoints(mine, np.full((len(mine), 3), 1 / 3))
     found = _near(
         other,
         wanted,
@@ -184,7 +188,7 @@ def _near(
     position: NDArray[np.float64],
     normal: NDArray[np.float64],
     max_distance: float,
-) -> SurfacePoints:
+) -> TrianglePoints:
     """Search triangles along the normals of n points, and return the nearest points with similar normals.
 
     Parameters
@@ -199,7 +203,7 @@ def _near(
     n = len(position)
     triangle, offset = np.full(n, -1, np.int64), np.full(n, np.inf)
     if not len(wanted) or max_distance <= 0:
-        return SurfacePoints(triangle, np.zeros((n, 3)))
+        return TrianglePoints(triangle, np.zeros((n, 3)))
     face = geometry.face_normal[wanted].astype(np.float64)
     corner = geometry.position[geometry.triangle[wanted]].astype(np.float64)
     # Make positions relative to the centre of the triangles, because single precision is finest around 0.
@@ -233,7 +237,7 @@ def _near(
     met = triangle >= 0
     weight = np.zeros((n, 3))
     weight[met] = _weights(corner[triangle[met]], position[met])
-    return SurfacePoints(np.where(met, wanted[triangle], -1), weight)
+    return TrianglePoints(np.where(met, wanted[triangle], -1), weight)
 
 
 def _weights(corner: NDArray[np.float64], position: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.comparison.match import Sides, SurfacePoints, match
+from baker.comparison.match import ComparedSurfaces, TrianglePoints, match
 from baker.core.geometry import Geometry
 from baker.core.progress import Progress, report
 from baker.core.stage import Stage
@@ -36,7 +36,7 @@ class FlipMeans:
     object: dict[tuple[str, int], float]
 
 
-def read(bake: StoredBake, geometry: Geometry, points: SurfacePoints, name: str) -> NDArray[np.float64]:
+def read(bake: StoredBake, geometry: Geometry, points: TrianglePoints, name: str) -> NDArray[np.float64]:
     """Look up the map of channel `name` bilinearly at n surface points, (n, C) float64."""
     return look_up_uv(bake.maps[name], geometry.page[points.triangle], points.at(geometry, "uv"))
 
@@ -44,7 +44,7 @@ def read(bake: StoredBake, geometry: Geometry, points: SurfacePoints, name: str)
 def page_flip(
     a: StoredBake,
     b: StoredBake,
-    sides: Sides,
+    sides: ComparedSurfaces,
     compared: NDArray[np.bool_],
     names: list[str],
     seed: int,
@@ -56,7 +56,7 @@ def page_flip(
     ----------
     a, b : StoredBake
         The bakes. b is the reference.
-    sides : Sides
+    sides : ComparedSurfaces
         Their surfaces.
     compared : (P, H, W) bool
         Texels of a at which the bakes are compared.
@@ -74,7 +74,7 @@ def page_flip(
         if not len(row):
             continue
         pixel = (number * size + row * step) * size + column * step
-        points = SurfacePoints(*one_surface_point(sides.a, pixel.astype(np.int64), size, seed))
+        points = TrianglePoints(*one_surface_point(sides.a, pixel.astype(np.int64), size, seed))
         other = match(sides, points)
         met = other.triangle >= 0
         row, column, points, other = row[met], column[met], points[met], other[met]

@@ -54,7 +54,7 @@ def is_inside_geometry(views: Views) -> NDArray[np.bool_]:
     return found
 
 
-def look_around(
+def cast_around(
     reference: Reference,
     origin: NDArray[np.float64],
     normal: NDArray[np.float64],

@@ -88,7 +88,7 @@ from baker.pathtracer.vertex import (
     start_path,
 )
 from baker.pathtracer.vertex_simd import (
-    aim_lanes,
+    aim_at_lights,
     arrive_lanes,
     look_up_falloff,
     scatter_lanes,
@@ -445,7 +445,7 @@ def trace_paths(
                 choose_lights(s, words, base, lights, light)
                 if len(lights.falloff) > 0:
                     look_up_falloff(s, base, lights, light)
-                aim_lanes(s, base, mode, power)
+                aim_at_lights(s, base, mode, power)
         else:
             for lane in range(BLOCK_WIDTH):
                 light[lane] = -1

@@ -212,7 +212,7 @@ def look_up_falloff(s, base, lights, light):
 
 
 @inner
-def aim_lanes(s, base, mode, power):
+def aim_at_lights(s, base, mode, power):
     """Sample a ray from each lane's vertex to the lane's light.
 
     Writes its unit direction, its length in metres, and the contribution if nothing blocks it. The

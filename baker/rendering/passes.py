@@ -40,7 +40,7 @@ _AOV_SAMPLES = 4
 
 
 @dataclass
-class Run:
+class RenderRun:
     """A picture while it is rendered.
 
     Attributes
@@ -132,7 +132,7 @@ class Run:
         )
 
 
-def traced(run: Run) -> PointEstimate:
+def traced(run: RenderRun) -> PointEstimate:
     """Return the path-traced radiance (H * W, 3), cd/m2."""
     settings = run.settings
     estimate = new_estimate(run.pixels, 3, run.samples(_PASS, _RATE))
@@ -146,7 +146,7 @@ def traced(run: Run) -> PointEstimate:
     return estimate
 
 
-def ambient_occlusion(run: Run, distance: float) -> PointEstimate:
+def ambient_occlusion(run: RenderRun, distance: float) -> PointEstimate:
     """Return ambient occlusion (H * W, 1), 0 to 1. A camera ray without a hit contributes 1."""
     estimate = new_estimate(run.pixels, 1, run.samples(_OPENNESS_PASS, _OPENNESS_RATE))
     while not run.enough(estimate):
@@ -172,7 +172,7 @@ def ambient_occlusion(run: Run, distance: float) -> PointEstimate:
     return estimate
 
 
-def lit_by(run: Run, baked: BakedLight, sky: tuple[float, float, float]) -> PointEstimate:
+def lit_by(run: RenderRun, baked: BakedLight, sky: tuple[float, float, float]) -> PointEstimate:
     """Return the radiance (H * W, 3), cd/m2, that an engine shows with the bake.
 
     It is albedo x irradiance / pi + emission at first hits, and `sky` for rays without a hit. Both are
@@ -193,7 +193,7 @@ def lit_by(run: Run, baked: BakedLight, sky: tuple[float, float, float]) -> Poin
     return estimate
 
 
-def first_layers(run: Run) -> dict[str, NDArray[np.float32]]:
+def first_layers(run: RenderRun) -> dict[str, NDArray[np.float32]]:
     """Return the layers of first hits: "albedo", "normal" (H, W, 3) and "depth" (H, W, 1), metres.
 
     Albedo and normal are means over `_AOV_SAMPLES` camera rays. Depth is the

@@ -22,7 +22,7 @@ from baker.pathtracer.camera import parse_camera
 from baker.pathtracer.scene import Reference, build_reference
 from baker.rendering.baked import BakedLight, other_scene
 from baker.rendering.cameras import named_camera
-from baker.rendering.passes import Run, ambient_occlusion, first_layers, lit_by, traced
+from baker.rendering.passes import RenderRun, ambient_occlusion, first_layers, lit_by, traced
 from baker.rendering.settings import RenderSettings
 
 
@@ -155,7 +155,7 @@ def render(
     if text is not None and camera is None:
         camera = named_camera(scene.cameras, text)
     with build_reference(scene, sky=sky, threads=settings.threads) as reference:
-        run = Run(reference, camera or _own_camera(scene, reference), settings, start, progress)
+        run = RenderRun(reference, camera or _own_camera(scene, reference), settings, start, progress)
         if settings.ao:
             estimate = ambient_occlusion(run, settings.ao_reach(reference.geometry.diagonal))
         elif baked is not None:

@@ -14,7 +14,7 @@ from baker.core.geometry import Geometry
 from baker.core.scene import Scene
 from baker.kernels.probe import BLACK_BACK, SOLID_BACK, SOLID_FRONT
 from baker.kernels.shading import Shading
-from baker.topology.solids import BEFORE, BEHIND, Solids, Surfaces, find_solids, lights_and_cameras
+from baker.topology.solids import BEFORE, BEHIND, Solids, SolidSurfaces, find_solids, lights_and_cameras
 
 
 def scene_solids(scene: Scene, geometry: Geometry, shading: Shading) -> Solids:
@@ -34,7 +34,7 @@ def scene_solids(scene: Scene, geometry: Geometry, shading: Shading) -> Solids:
     Solids
         Classification of each triangle.
     """
-    surfaces = Surfaces(
+    surfaces = SolidSurfaces(
         position=geometry.position,
         triangle=geometry.triangle,
         instance=geometry.instance,

@@ -48,7 +48,7 @@ _LARGEST, _HELD = 32, 64
 _MOST_WORK = 200_000_000
 
 
-class Surfaces(NamedTuple):
+class SolidSurfaces(NamedTuple):
     """All triangles of a scene.
 
     Attributes
@@ -120,12 +120,12 @@ def lights_and_cameras(scene: Scene) -> NDArray[np.float64]:
     return np.concatenate([light_positions(scene), cameras]) - scene.origin
 
 
-def find_solids(surfaces: Surfaces, viewpoints: NDArray[np.float64]) -> Solids:
+def find_solids(surfaces: SolidSurfaces, viewpoints: NDArray[np.float64]) -> Solids:
     """Classify closed parts as solids, rooms and covers.
 
     Parameters
     ----------
-    surfaces : Surfaces
+    surfaces : SolidSurfaces
         All triangles.
     viewpoints : (N, 3) float64, metres
         Positions of lights and cameras, relative to the origin of the surfaces.
@@ -164,7 +164,7 @@ class _Classifier:
     `order[start[p] : start[p + 1]]` are the triangles of part p. `around` maps each hollow to its solid.
     """
 
-    def __init__(self, surfaces: Surfaces, parts: ClosedParts, viewpoints: NDArray[np.float64]) -> None:
+    def __init__(self, surfaces: SolidSurfaces, parts: ClosedParts, viewpoints: NDArray[np.float64]) -> None:
         self.surfaces, self.parts, self.viewpoints = surfaces, parts, viewpoints
         n = len(parts.area)
         in_part = np.flatnonzero(parts.part >= 0)

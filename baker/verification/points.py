@@ -23,7 +23,7 @@ from baker.metrics.texel_area import SurfacePoints, instance_map, one_surface_po
 from baker.pathtracer.scene import Reference
 from baker.verification.edges import edge_points
 from baker.verification.settings import VerifySettings
-from baker.verification.surroundings import look_around
+from baker.verification.surroundings import find_surroundings
 
 # Kinds of points, see `Points.kind`.
 TEXEL, OUTLIER, STEEP, EDGE, SCARCE = 0, 1, 2, 3, 4
@@ -142,7 +142,7 @@ def choose_points(
     kind = np.repeat(kinds, [*map(len, parts), len(edge.pixel), len(scarce)]).astype(np.int8)
     spread = [surface_points(geometry, part, size, POINTS_PER_TEXEL, seed) for part in (*parts, scarce)]
     surface = joined([*spread[:-1], edge.surface, spread[-1]])
-    around = look_around(reference, surface, seed)
+    around = find_surroundings(reference, surface, seed)
     each, back = np.unique(pixel, return_inverse=True)
     chart = chart_numbers(geometry)[one_surface_point(geometry, each, size, seed)[0]][back]
     n = len(bake.scene.instances)

@@ -21,8 +21,7 @@ from baker.kernels.probe import BLACK_BACK, SOLID_BACK, SOLID_FRONT
 from baker.kernels.surface import OFFSET, ROUNDING
 from baker.metrics.texel_area import SurfacePoints
 from baker.pathtracer.first_hit import first_hits
-from baker.pathtracer.inside_geometry import RAYS, is_inside_geometry
-from baker.pathtracer.inside_geometry import look_around as cast_around
+from baker.pathtracer.inside_geometry import RAYS, cast_around, is_inside_geometry
 from baker.pathtracer.scene import Reference
 
 # Length of a ray below which it counts as near, texels.
@@ -68,7 +67,7 @@ class Surroundings:
     air: NDArray[np.float64]
 
 
-def look_around(reference: Reference, points: SurfacePoints, seed: int) -> Surroundings:
+def find_surroundings(reference: Reference, points: SurfacePoints, seed: int) -> Surroundings:
     """Find the points inside geometry, and the narrow gaps and rooms of n texels with k points each."""
     random = np.random.Generator(np.random.PCG64([seed, 9]))
     black, near, air = _first_look(reference, points, random)

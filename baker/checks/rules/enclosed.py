@@ -11,7 +11,7 @@ from baker.checks.context import CheckContext
 from baker.checks.finding import Location, RawFinding
 from baker.checks.rule import check
 from baker.checks.world_triangles import WorldTriangles
-from baker.topology.solids import BEFORE, BEHIND, Solids, Surfaces, find_solids, lights_and_cameras
+from baker.topology.solids import BEFORE, BEHIND, Solids, SolidSurfaces, find_solids, lights_and_cameras
 
 # A face is tested at its centroid and near its three corners. This is the share of the way from a corner to
 # the centroid at which the point near the corner lies.
@@ -95,7 +95,7 @@ def _found(context: CheckContext, rows: NDArray[np.int64], text: str) -> RawFind
 
 def _solids(context: CheckContext, world: WorldTriangles) -> Solids:
     materials = context.scene.materials
-    surfaces = Surfaces(
+    surfaces = SolidSurfaces(
         position=world.position,
         triangle=world.triangle,
         instance=world.instance,

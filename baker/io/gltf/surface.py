@@ -39,7 +39,7 @@ _LAYERS = (
 )
 
 
-class Surface(NamedTuple):
+class PbrSurface(NamedTuple):
     """Base colour, metallic and roughness of a material.
 
     Attributes
@@ -59,7 +59,7 @@ class Surface(NamedTuple):
     roughness: float
 
 
-def read_surface(material: JsonObject, name: str, warnings: list[SceneWarning]) -> Surface:
+def read_surface(material: JsonObject, name: str, warnings: list[SceneWarning]) -> PbrSurface:
     """Read base colour, metallic and roughness; an unknown reflection model gets albedo 0.5 and a warning.
 
     Parameters
@@ -73,14 +73,14 @@ def read_surface(material: JsonObject, name: str, warnings: list[SceneWarning]) 
 
     Returns
     -------
-    Surface
+    PbrSurface
         Base colour, its texture, metallic and roughness.
     """
     metallic_roughness = material.child_or_empty("pbrMetallicRoughness")
     unlit = material.extension("KHR_materials_unlit") is not None
     glossy = material.extension(_GLOSSY)
     if glossy is not None and not unlit:
-        return Surface(
+        return PbrSurface(
             _four(glossy.numbers("diffuseFactor", 4, (1.0, 1.0, 1.0, 1.0))),
             glossy,
             "diffuseTexture",
@@ -97,7 +97,7 @@ def read_surface(material: JsonObject, name: str, warnings: list[SceneWarning]) 
             )
             warnings.append(SceneWarning("unknown-material", message, name))
             colour = (UNKNOWN_ALBEDO, UNKNOWN_ALBEDO, UNKNOWN_ALBEDO, 1.0)
-    return Surface(
+    return PbrSurface(
         colour,
         metallic_roughness,
         "baseColorTexture",

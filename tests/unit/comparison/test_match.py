@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from tiny_scenes import Quad, joined, quad_atlas, quad_scene
 
-from baker.comparison.match import SurfacePoints, make_sides, match
+from baker.comparison.match import TrianglePoints, make_sides, match
 from baker.comparison.pairs import pair_objects
 from baker.comparison.pictures import read
 from baker.core.atlas import Atlas, InstanceLayout
@@ -39,7 +39,7 @@ def sides_of(a, b):
 def scattered(geometry, n=400):
     random = np.random.default_rng(5)
     weight = random.dirichlet((1, 1, 1), n)
-    return SurfacePoints(random.integers(0, len(geometry.triangle), n), weight)
+    return TrianglePoints(random.integers(0, len(geometry.triangle), n), weight)
 
 
 def assert_same_places(sides, points, found):

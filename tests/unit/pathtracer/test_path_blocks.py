@@ -70,12 +70,12 @@ from baker.pathtracer.vertex import N_ROWS as PATH_ROWS
 from baker.pathtracer.vertex import NORMAL as PATH_NORMAL
 from baker.pathtracer.vertex import POSITION, aim, arrive, set_frame
 from baker.pathtracer.vertex import SHADED as PATH_SHADED
-from baker.pathtracer.vertex_simd import aim_lanes, arrive_lanes, look_up_falloff, scatter_lanes
+from baker.pathtracer.vertex_simd import aim_at_lights, arrive_lanes, look_up_falloff, scatter_lanes
 from baker.trace.packets import DIR_X, HIT_U, ORG_X, PRIM_ID
 
 ALPHA = 1e-4
 aim, arrive, set_frame = compiled(aim, arrive, set_frame)
-aim_lanes, arrive_lanes, scatter_lanes = compiled(aim_lanes, arrive_lanes, scatter_lanes)
+aim_at_lights, arrive_lanes, scatter_lanes = compiled(aim_at_lights, arrive_lanes, scatter_lanes)
 (look_up_falloff,) = compiled(look_up_falloff)
 choose_lights, fetch_lanes, random_lanes = compiled(choose_lights, fetch_lanes, random_lanes)
 (close_gaps,) = compiled(close_gaps)
@@ -245,7 +245,7 @@ def test_lights_are_aimed_at_as_one_at_a_time(some_lights, mode, power):
         bits[CHOICE] = rng.integers(0, 2**32, BLOCK_WIDTH, dtype=np.uint32)
         choose_lights(s, words, 0, some_lights, light)
         look_up_falloff(s, 0, some_lights, light)
-        aim_lanes(s, 0, mode, power)
+        aim_at_lights(s, 0, mode, power)
         for lane in range(BLOCK_WIDTH):
             path[POSITION : POSITION + 3, lane] = rows[0, ORG_X : ORG_X + 3, lane]
             path[PATH_NORMAL : PATH_NORMAL + 3, lane] = normal[lane]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scenes import icosphere
 
-from baker.topology.solids import BEFORE, BEHIND, NOWHERE, Surfaces, find_solids
+from baker.topology.solids import BEFORE, BEHIND, NOWHERE, SolidSurfaces, find_solids
 from baker.topology.winding_number import Enclosure, winding_number
 
 BOX = np.array(
@@ -48,7 +48,7 @@ def classify(*objects, viewpoints=NOBODY, double_sided=True, emits=(), hit_filte
     count = [len(one) for one in objects]
     corner = np.concatenate(objects).reshape(-1, 3)
     owner = np.repeat(np.arange(len(objects)), count)
-    surfaces = Surfaces(
+    surfaces = SolidSurfaces(
         position=corner.astype(np.float32),
         triangle=np.arange(len(corner)).reshape(-1, 3),
         instance=owner,

@@ -13,7 +13,7 @@ from baker.metrics.texel_area import instance_map, surface_points
 from baker.pathtracer.scene import build_reference
 from baker.verification.edges import border_texels, edge_points
 from baker.verification.points import chart_numbers
-from baker.verification.surroundings import in_contact, look_around, visible
+from baker.verification.surroundings import find_surroundings, in_contact, visible
 
 SIZE = 64
 
@@ -44,8 +44,8 @@ def test_closed_rooms_are_told_apart():
     geometry, owner, reference = surface(two_rooms())
     with reference:
         pixel, points = points_of(geometry, owner, 3)
-        found = look_around(reference, points, 0)
-        again = look_around(reference, points, 0)
+        found = find_surroundings(reference, points, 0)
+        again = find_surroundings(reference, points, 0)
     first = owner.reshape(-1)[pixel] < 6
     assert set(found.room[first]) | set(found.room[~first]) <= {-1, 0, 1}
     for side in (first & ~found.gap, ~first & ~found.gap):
@@ -62,7 +62,7 @@ def test_a_gap_is_no_room():
     geometry, owner, reference = surface([floor, *plate])
     with reference:
         pixel, points = points_of(geometry, owner)
-        found = look_around(reference, points, 0)
+        found = find_surroundings(reference, points, 0)
         near = in_contact(reference, points, 0)
     on_floor = owner.reshape(-1)[pixel] == 0
     under = (np.abs(points.position[:, :, :2] - 0.5).max(axis=(1, 2)) < 0.2) & on_floor
@@ -82,7 +82,7 @@ def test_nobody_looks_around_from_inside_of_solids():
     geometry, owner, reference = surface([floor, *quads])
     with reference:
         _, points = points_of(geometry, owner)
-        found = look_around(reference, points, 0)
+        found = find_surroundings(reference, points, 0)
     inside = [
         ((found.air > np.add(low, 1e-3)) & (found.air < np.subtract(high, 1e-3))).all(axis=1)
         for low, high in corners
