@@ -38,7 +38,7 @@ class AlphaTable(NamedTuple):
     slot : (T,) int32
         Row in `row` of each triangle of the scene, -1 for opaque triangles; (0,) if all triangles are opaque.
     row : (K, 16) float32
-        Data of these triangles, see the column names.
+        Data of these triangles, columns UV to SURFACE.
     """
 
     slot: NDArray[np.int32]
@@ -69,7 +69,7 @@ def opacity(row, k, pack, b1, b2):  # type: ignore[no-untyped-def]
         v = np.float64(row[k, UV + 1]) + b1 * row[k, UV_EDGE_1 + 1] + b2 * row[k, UV_EDGE_2 + 1]
         alpha *= sample_alpha(pack, np.int64(row[k, TEXTURE]), u, v)
     if row[k, CUTOFF] >= np.float32(0.0):
-        # Round to float32, because the weights of a lookup may sum to slightly less than 1.
+        # Round alpha to float32, because the weights of a texture lookup may sum to slightly less than 1.
         return 1.0 if np.float32(alpha) >= row[k, CUTOFF] else 0.0
     return smaller(larger(alpha, 0.0), 1.0)
 

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Clips triangles to the square of a texel, and computes area and uniform points of the clipped polygon.
+"""Clips triangles to the square of a texel; computes the area of the clipped polygon and points in it.
 
 Based on: Sutherland and Hodgman, Reentrant polygon clipping, 1974.
 """
@@ -12,8 +12,8 @@ import numpy as np
 
 from baker.trace.jit import inner, larger, scratch, smaller
 
-# Rows of a polygon array. A triangle clipped by four half-planes has at most seven corners, and clipping
-# needs two more rows.
+# Number of rows of a polygon array. A triangle clipped by four half-planes has at most seven corners, and
+# clipping needs two more rows.
 MAX_CORNERS = 9
 # Working memory of kernels: a triangle (3, 2) and a clipped polygon (MAX_CORNERS, 2), float64.
 new_triangle = scratch((3, 2), np.float64)
@@ -123,7 +123,7 @@ def square_touches(corner, x0, y0):
         base = nx * (x0 - corner[i, 0]) + ny * (y0 - corner[i, 1])
         if base + larger(nx, 0.0) + larger(ny, 0.0) < 0.0:
             return 0
-        # Treat a triangle without area as a line, which touches the texels that it crosses.
+        # Treat a triangle without area as a line: it touches the texels that it crosses.
         if twice == 0.0 and base + smaller(nx, 0.0) + smaller(ny, 0.0) > 0.0:
             return 0
         if base + smaller(nx, 0.0) + smaller(ny, 0.0) < 0.0:

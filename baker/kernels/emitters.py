@@ -1,6 +1,6 @@
-"""Sampling of emissive triangles.
+"""Random choice of points on emissive triangles (emitters), to which shadow rays are cast.
 
-Neighbouring triangles are grouped into clusters. A sample is chosen in three steps:
+Neighbouring triangles are grouped into clusters. A point is chosen in three steps:
 
 1. a cluster, in proportion to an estimate of its contribution to a tile of texels (`cluster_chances`);
 2. a triangle of the cluster, in proportion to its power;
@@ -54,7 +54,7 @@ class Emitters(NamedTuple):
     Attributes
     ----------
     row : (M, 24) float32
-        Data of each emitter, sorted by cluster, see the column names.
+        Data of each emitter, sorted by cluster; columns CORNER to INSIDE.
     triangle : (M,) int32
         Triangle of the scene that contains each emitter.
     first : (C + 1,) int32
@@ -64,7 +64,7 @@ class Emitters(NamedTuple):
     radius : (C,) float32
         Radius of that sphere, metres.
     power : (C,) float32
-        Sum of the powers of each cluster's emitters.
+        Sum of the powers of each cluster's emitters, see `lights.emissive`.
     axis : (C, 3) float32
         Unit axis of a cone that contains the cluster's normals.
     spread : (C,) float32
@@ -72,7 +72,8 @@ class Emitters(NamedTuple):
     node : (K, 4) int32
         Subdivisions of textured triangles, see `emitter_at`.
     root : (T,) int32
-        Code of each triangle of the scene, from which `emitter_at` finds its emitters.
+        Code of each triangle of the scene, from which `emitter_at` finds the emitter at a point of the
+        triangle.
     """
 
     row: NDArray[np.float32]
@@ -88,7 +89,7 @@ class Emitters(NamedTuple):
 
 
 class TileEmitters(NamedTuple):
-    """Emitters with the probabilities of their clusters for one tile of texels.
+    """The emitters, and the probability of each cluster for one tile of texels.
 
     Attributes
     ----------
@@ -99,8 +100,9 @@ class TileEmitters(NamedTuple):
     cumulative : (C,) float32
         Cumulative sum of `chance`.
     apart : (C,) uint8
-        1 for clusters that are sampled as a separate stratum. Gather rays that hit these clusters contribute
-        also at texels for which the light of the other emitters is computed in closed form.
+        1 for clusters that are sampled as a separate stratum (`radiosity.emitter_choice`). Gather rays that
+        hit these clusters contribute also to texels whose light from the other clusters is computed in closed
+        form.
     """
 
     row: NDArray[np.float32]
@@ -113,7 +115,7 @@ class TileEmitters(NamedTuple):
 
 
 def tile_emitters(emitters: Emitters, origin: NDArray[np.float32]) -> TileEmitters:
-    """Return the emitters with the probabilities of their clusters for a tile.
+    """Return the emitters, with the probability of each cluster for a tile.
 
     Parameters
     ----------
@@ -178,10 +180,9 @@ def bounding_sphere(origin):  # type: ignore[no-untyped-def]
 
 @kernel
 def widest_view(emitters, origin):  # type: ignore[no-untyped-def]
-    """Return the largest radius / distance of a cluster as seen from points.
-
-    The distance is from the cluster's centre to the bounding sphere of the points. If this sphere touches the
-    sphere of a cluster, inf is returned.
+    """Return the largest radius / distance of all clusters, as seen from points.
+    The distance is from the cluster's centre to the bounding sphere of the points. If that bounding sphere
+    touches the sphere of a cluster, inf is returned.
 
     emitters : Emitters; origin : (m, w, 3) float32, metres, points
     """
@@ -203,11 +204,11 @@ def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-un
     """Write the probability of each cluster for points, which are represented by their bounding sphere.
 
         weight = power / max(distance^2, (sum of both radii)^2) * max(cos(angle), 0.05)
-
-    `angle` is a lower bound of the angle between a normal of the cluster and a direction from the cluster to
-    the sphere. If it is 90 degrees or more, the weight is 0, because no point of the sphere sees an emitting
-    side. The probability of the other clusters is 0.95 weight / (sum of weights) + 0.05 / (number of other
-    clusters).
+        `distance` is between the centres of the cluster and of the bounding sphere. `angle` is a lower bound
+        of the angle between a normal of the cluster and a direction from the cluster to the bounding sphere.
+        If it is 90 degrees or more, the weight is 0, because no point sees an emitting side. The probability
+        of a cluster of positive weight is 0.95 weight / (sum of weights) + 0.05 / (number of clusters of
+        positive weight).
 
     emitters : Emitters; origin : (m, w, 3) float32, metres, points
     chance, cumulative : (C,) float32 output, see `TileEmitters`
@@ -239,7 +240,7 @@ def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-un
                 weight *= larger(math.cos(angle), 0.05)
         chance[c] = weight
         total += weight
-    # Normalise the weights, mix them with equal shares, and compute the cumulative sum.
+    # Normalise the weights, mix them with equal probabilities, and compute the cumulative sum.
     lit = 0
     for c in range(n):
         lit += chance[c] > 0.0
@@ -256,8 +257,8 @@ def choose_emitter(row, first, chance, cumulative, u):  # type: ignore[no-untype
     """Choose an emitter with the uniform number u.
 
     row (M, 24), first (C + 1,) : see `Emitters`; chance, cumulative : (C,) float32, see `TileEmitters`
-    Returns the emitter, the probability density of a point on it per m2, and a new uniform number in [0, 1)
-    computed from u.
+    Returns the emitter, the probability density per m2 of each point on it, and a new uniform number in [0,
+    1) computed from u.
     """
     # Choose a cluster.
     n = len(cumulative)
@@ -311,8 +312,8 @@ def emitter_at(node, code, b1, b2):  # type: ignore[no-untyped-def]
     code : code of the triangle, see below
 
     Textured triangles are subdivided into emitters. A code m >= 0 means emitter m. A code -1 means that
-    nothing is emitted. A code -2 - k means a subdivision into four parts with the codes node[k]: the parts at
-    corners 0, 1 and 2, and the rotated part in the middle.
+    nothing is emitted. A code -2 - k means a subdivision into four parts, whose codes are node[k]. The first
+    three parts are at corners 0, 1 and 2. The fourth is in the middle, rotated by 180 degrees.
     """
     while code < -1:
         k = -2 - code

@@ -10,7 +10,7 @@ from baker.kernels.triangle_lookup import front_facing
 from baker.trace.jit import kernel, smaller
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, NO_HIT, PACKET_WIDTH, PRIM_ID, trace_lanes
 
-# Values of `hit_kind`: what a first hit on a triangle says about the origin of the ray.
+# Values of `hit_kind`: what a first hit on a triangle implies about the origin of the ray.
 #
 #     0             nothing
 #     BLACK_BACK    the triangle's back is black; if all rays of a point hit such backs, the point is inside
@@ -21,8 +21,9 @@ BLACK_BACK, SOLID_BACK, SOLID_FRONT = 1, 2, 3
 # Number of hits on solids from inside that prove a point to be inside. A single such hit is no proof, because
 # the ray may have passed through an edge.
 PROOF = 2
-# Factor in `hits` = n_inside + ELSEWHERE * n_elsewhere. n_inside rays hit a solid from inside. n_elsewhere
-# rays hit neither a solid from inside nor a black back.
+# Factor of n_elsewhere in `hits` = n_inside + ELSEWHERE * n_elsewhere. n_inside is the number of rays that
+# hit a solid
+# from inside. n_elsewhere is the number of rays that hit neither a solid from inside nor a black back.
 ELSEWHERE = 16
 
 
@@ -32,15 +33,15 @@ def inside_hits(
 ):
     """Cast rays from w points of each of m texels, and count their first hits by kind.
 
-    Sixteen texels are processed together, point number after point number. The remaining rays of a point
-    number are skipped when each of the sixteen points with this number is known to be inside or outside.
+    Sixteen texels are processed together: first point 0 of each texel, then point 1, and so on. When each of
+    the sixteen current points is known to be inside or outside, their remaining rays are skipped.
 
-    origin, normal : (m, w, 3) float32, metres, world, and unit; each point casts `rays_per_point`
+    origin, normal : (m, w, 3) float32, metres and unit vectors, world; each point casts `rays_per_point`
         cosine-weighted rays
     lookup : TriangleLookup; hit_kind : (T,) uint8, see `BLACK_BACK`
     buffers : PacketBuffers
     begin : number of the first texel, which seeds the random numbers and is the row of `hits`
-    sobol_points : (w * rays_per_point, 2) uint32; shared : uint32, see `sampling`
+    sobol_points : (w * rays_per_point, 2) uint32; shared : uint32, from `kernels.sampling.shared_bits_mask`
     proof : number of hits on solids from inside that prove a point to be inside
     hits : (n, w) uint8, counts are added, see `ELSEWHERE`
     Returns the number of rays cast.

@@ -1,9 +1,11 @@
 # mypy: disable-error-code="no-untyped-def"
 """Hemisphere rays of sixteen texels at a time, in loops that the compiler vectorises.
 
-The tangent frame of each texel's current point is stored in `frame`. For each sample, two Sobol numbers are
-scrambled, mapped to the hemisphere about +z, and rotated into the frame. All rows of `frame` are at constant
-offsets in one array, so that the compiler can prove that they do not overlap.
+`frame` stores the tangent frame at one point of each texel. For each sample, two Sobol numbers are scrambled,
+mapped
+to the hemisphere about +z, and rotated into the frame. All rows of `frame` are at constant offsets in one
+array, so
+that the compiler can prove that they do not overlap.
 """
 
 from __future__ import annotations
@@ -26,9 +28,9 @@ new_frame = scratch((FRAME_ROWS * PACKET_WIDTH,), np.float32)
 
 @inner
 def lane_seeds(first, lanes, salt, seeds):
-    """Write the scramble seeds of `lanes` items from item `first` on, for both dimensions of a sample.
+    """Write the scramble seeds of item `first` + lane into each lane, for both dimensions of a sample.
 
-    salt : int, a different number for each kind of rays
+    lanes : number of lanes to write, at most 16; salt : int, a different number for each kind of rays
     seeds : (2 * 16,) uint32 output, by dimension and lane
     """
     for lane in range(lanes):
@@ -38,11 +40,11 @@ def lane_seeds(first, lanes, salt, seeds):
 
 @inner
 def load_frames(rays, frame, origin, normal, group, lanes, k):
-    """Write origin and tangent frame of point k of `lanes` texels from texel `group` on, by lane.
+    """Write origin and tangent frame of point k of texel `group` + lane into each lane.
 
-    origin, normal : (n, w, 3) float32, metres, world, and unit
-    rays : (21 * 16,) float32 output, a packet whose origins are set
-    frame : (9 * 16,) float32 output, see the row names
+    origin, normal : (n, w, 3) float32, metres and unit vectors, world
+    rays : (21 * 16,) float32, a packet of sixteen rays (`trace.packets`); its origins are set
+    frame : (9 * 16,) float32 output; tangent, bitangent, normal
     """
     for lane in range(lanes):
         for a in range(3):
@@ -68,7 +70,8 @@ def aim_lanes(rays, words, frame, seeds, first, second, shared, far):
 
     rays, words : (21 * 16,) float32 and uint32 views of one packet; directions, TFAR and GEOM_ID are set
     frame : (9 * 16,) float32, from `load_frames`; seeds : (2 * 16,) uint32, from `lane_seeds`
-    first, second : uint32, bit-reversed Sobol numbers of the sample; shared : uint32, see `sampling`
+    first, second : uint32, bit-reversed Sobol numbers of the sample
+    shared : uint32, from `kernels.sampling.shared_bits_mask`
     far : float32, TFAR, metres
     """
     for lane in range(PACKET_WIDTH):

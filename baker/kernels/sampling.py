@@ -1,9 +1,11 @@
 """Low-discrepancy points in the unit square, and maps from it to directions and triangles.
 
 The points are the first two Sobol dimensions (a (0,2)-sequence) with nested uniform (Owen) scrambling. The
-leading bits (`shared`) are scrambled in the same way for all texels, the other bits differently for each
-texel. So sample s of neighbouring texels has similar directions, and ray packets stay coherent. The points of
-one texel are still a fully scrambled net.
+leading bits (`shared_bits_mask`) are scrambled in the same way for all texels, the other bits differently for
+each
+texel. So the rays of sample s have similar directions in all texels, and ray packets stay coherent. The
+points
+of one texel are still a fully scrambled net.
 
 Based on: Sobol, 1967; Owen, Randomly permuted (t,m,s)-nets, 1995; Laine and Karras, Stratified
 sampling for stochastic transparency, 2011 (the hash); Burley, Practical hash-based Owen scrambling,
@@ -64,11 +66,11 @@ def scramble_reversed(x, seed):  # type: ignore[no-untyped-def]
 @inner
 def texel_scramble(shared_reversed, seed, mask):  # type: ignore[no-untyped-def]
     """Return a float32 in [0, 1): a Sobol number with its unshared bits scrambled by the texel's seed.
-
-    shared_reversed : uint32, Sobol number, scrambled in the same way for all texels, bit-reversed
+    shared_reversed : uint32, Sobol number from `sobol_reversed`: all its bits are already scrambled in the
+        same way for all texels; bit-reversed
     seed : uint32, seed of the texel
-    mask : uint32, shared bits, which are the lowest bits of a bit-reversed number
-    The result is truncated to 24 bits, because rounding up could move it into the next cell of the net.
+    mask : uint32, from `shared_bits_mask`; shared bits are the lowest bits of a bit-reversed number
+    The result is truncated to 24 bits, because rounding up could move it into the next stratum of the net.
     """
     y = scramble_reversed(shared_reversed, seed)
     y = _u((y & _u(~mask)) | (shared_reversed & mask))
@@ -85,7 +87,7 @@ def sobol_reversed(n: int, seed: int, dimension_pair: int) -> NDArray[np.uint32]
     seed : int
         Seed of the scramble.
     dimension_pair : int
-        Different numbers give independently scrambled sequences.
+        Number of the sequence. Different numbers give independently scrambled sequences.
 
     Returns
     -------

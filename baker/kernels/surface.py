@@ -1,7 +1,8 @@
 # mypy: disable-error-code="no-untyped-def"
 """The sample points of texels, from which rays start.
 
-Each texel has 16 points. They are uniformly distributed in the part of its square that triangles cover, and
+Each texel has 16 points. They are uniformly distributed in the part of the texel's square that triangles
+cover, and
 stratified by a scrambled (0,2)-net. On low-poly curved surfaces, points are moved to the smooth surface that
 the shading normals imply (Hanika 2021). Otherwise facets would block each other's rays at the shadow
 terminator.
@@ -22,7 +23,7 @@ from baker.kernels.clip import clip_to_square, new_polygon, new_triangle, polygo
 from baker.kernels.sampling import hash_combine, texel_scramble
 from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
-# Points of a texel.
+# Number of sample points of a texel.
 N_POINTS = 16
 # Factors of the offset of ray origins along the face normal. The offset is
 #
@@ -32,13 +33,14 @@ N_POINTS = 16
 # sixteen times the relative spacing of float32 numbers. Rounding moves an origin and a hit by one spacing
 # each, and faces that are meant to be coplanar may be a few spacings apart.
 OFFSET, ROUNDING = 1.0e-5, 1.9e-6
-# Distance by which points near the border of their triangle move towards its centroid, as a multiple of the
-# offset. It is limited to half of the distance to the centroid.
+# Distance by which points near the border of their triangle are moved towards its centroid, as a multiple of
+# the
+# offset. The distance is at most half of the distance to the centroid.
 INWARD = 2.0
-# Barycentric coordinate below which a point is near the border.
+# Smallest barycentric coordinate of a point. Below it, the point is near the border.
 BORDER = 0.01
-# Cosine between a vertex normal and the face normal up to which the vertex is left out of the
-# shadow-terminator offset (Hanika 2021). Such a vertex is on a hard edge, not on a smooth surface.
+# Cosine between a vertex normal and the face normal. Up to it, the vertex is on a hard edge, not on a smooth
+# surface, and is left out of the shadow-terminator offset (Hanika 2021).
 STEEPEST = 0.7
 _u = np.uint32
 # Rows of the output of `load_flat`: corner 0, edges 1 and 2, signed face normal (3 each), triangle size (1).
@@ -47,7 +49,7 @@ _flat_row = scratch((5, 3), np.float64)
 
 
 class Surface(NamedTuple):
-    """Arrays of `core.geometry.Geometry` and `core.texels.TexelBuffer` from which points are computed.
+    """Arrays of `core.geometry.Geometry` and `core.texels.TexelBuffer` from which sample points are computed.
 
     A texel entry is the front of a texel, its back on a double-sided surface, or a further side of a texel
     that another surface passes through (`radiosity.sides`).
@@ -67,11 +69,11 @@ class Surface(NamedTuple):
     pixel : (n,) int64
         (page * size + row) * size + column of each texel entry.
     front : (n,) int32
-        Front entry of the same texel.
+        Front entry of the texel of each entry.
     back : (n,) bool
         Whether the entry is on the back of a double-sided surface.
     first : (n_front + 1,) int64
-        Front entry i lies on the triangles `entry[first[i] : first[i + 1]]`.
+        The texel of front entry i contains the triangles `entry[first[i] : first[i + 1]]`.
     entry : (m,) int32
         Triangles.
     entry_area : (m,) float32
@@ -79,7 +81,7 @@ class Surface(NamedTuple):
     sobol_points : (16, 2) uint32
         Bit-reversed Sobol numbers of the 16 points of a texel.
     min_offset_scale : float32
-        Lower limit, metres, of the largest coordinate in the OFFSET term of `offset_step`.
+        Lower limit of x in the term OFFSET min(x, s) of `offset_step`, metres.
     """
 
     position: NDArray[np.float32]
@@ -155,8 +157,9 @@ def place_point(
     sign = -1.0 if flip else 1.0
     length = math.sqrt(nx * nx + ny * ny + nz * nz)
     facing = nx * fx + ny * fy + nz * fz
-    # If the shading normal is zero or points to the other side, use the face normal. Otherwise move the point
-    # towards the tangent planes of the vertices below which it lies, weighted by barycentrics (Hanika 2021).
+    # If the shading normal is zero or points to the other side, use the face normal. Otherwise, for each
+    # vertex whose tangent plane lies above the point, move the point towards that plane, weighted by the
+    # barycentric (Hanika 2021).
     lx = ly = lz = 0.0
     if length < 1.0e-6 or facing <= 0.0:
         nx, ny, nz, length = fx, fy, fz, 1.0
@@ -232,7 +235,9 @@ def load_flat(position, shading, face, triangle, t, sign, row):
 
 @inner
 def place_flat_point(row, min_offset_scale, b1, b2, origin, normal, n, k):
-    """Write the same output as `place_point` for a point of a flat triangle that is not near the border.
+    """Write the ray origin and the normal of a point of a flat triangle, as `place_point` does.
+    The point must not be near the border of the triangle.
+
 
     row : (5, 3) float64, from `load_flat`; min_offset_scale : see `Surface`
     origin, normal : (N, K, 3) float32 output, items [n, k] are set; metres, and unit
@@ -257,7 +262,7 @@ def place_points(surface, valid_points, chosen, wanted, origin, normal, hit_tria
         by a valid point of the same entry, if it has any
     chosen : (m,) int64, entries
     wanted : (m, w) uint8, numbers 0 to 15 of the points of each entry; (1, w): the same for all entries
-    origin, normal : (m, w, 3) float32 output, metres, world, and unit
+    origin, normal : (m, w, 3) float32 output, metres and unit vectors, world
     hit_triangle : (m, w) int32 output, triangle on which each point lies; with shape (0, w), `hit_triangle`
         and `bary` are not written
     bary : (m, w, 2) float32 output, barycentrics b1 and b2 of each point on its triangle

@@ -28,8 +28,8 @@ def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position
     area : (n,) float32 output, m2 of surface inside the texel
     centroid : (n, 2) float32 output, centroid of the covered part of the texel's square, texels from its
         centre
-    position, normal : (n, 3) float32 output, metres, world, and unit; at the centroid, on the triangle with
-        the largest area in the texel
+    position, normal : (n, 3) float32 output, metres and unit vectors, world; at the centroid, on the triangle
+        with the largest area in the texel
     """
     corner, cut, spare, point, facing = new_triangle(), new_polygon(), new_polygon(), _vector(), _vector()
     for i in range(begin, end):
@@ -59,7 +59,7 @@ def texel_geometry(surface, triangle_scale, begin, end, area, centroid, position
         centroid[i, 0] = cx / total - 0.5
         centroid[i, 1] = cy / total - 0.5
         area[i] = metres
-        # Compute position and normal at the centroid, on that triangle.
+        # Compute position and normal at the centroid, on the triangle of largest area.
         a, b, c, d, g, h = inverse_uv(surface.uv, surface.triangle, surface.size, main)
         x, y = x0 + cx / total, y0 + cy / total
         place_point(
@@ -120,9 +120,11 @@ def uv_at(uv, triangle, t, b1, b2):
 
 @inner
 def texel_footprint(surface, image_uv, t):
-    """Return the side, in image uv, of a square with 1/16 of a texel's area, the share of each sample point.
+    """Return the side, in image uv, of a square with 1/16 of a lightmap texel's area on triangle t.
 
-    surface : Surface; image_uv : (V, 2) float32, of each vertex; t : triangle
+    A texel has 16 sample points, so this is the area of one point.
+
+    surface : Surface; image_uv : (V, 2) float32, of each vertex
     """
     i, j, k = surface.triangle[t, 0], surface.triangle[t, 1], surface.triangle[t, 2]
     lightmap = abs(
@@ -176,7 +178,7 @@ def texel_albedo(surface, shading, valid_points, begin, end, albedo, area):
                 share[k] = opacity_at(shading, hit[0, k], bary[0, k, 0], bary[0, k, 1])
                 total += share[k]
             area[i] *= total / N_POINTS
-            # Use the unweighted mean if the opacity is 0 at all points.
+            # If the opacity is 0 at all points, use the unweighted mean.
             for k in range(N_POINTS):
                 share[k] = share[k] * N_POINTS / total if total > 0.0 else 1.0
         for k in range(N_POINTS):

@@ -18,7 +18,8 @@ from baker.trace.jit import inner, larger, smaller
 
 # Largest number of mip levels of a texture.
 MAX_LEVELS = 16
-# Columns of `TexturePack.level`, columns of `TexturePack.wrap`, and the alpha column of pixels.
+# Columns of `TexturePack.level`, columns of `TexturePack.wrap`, and the alpha column of pixels, in this
+# order.
 OFFSET, WIDTH, HEIGHT = 0, 1, 2
 WRAP_U, WRAP_V, NEAREST, STORAGE = 0, 1, 2, 3
 ALPHA = 3
@@ -27,7 +28,7 @@ _REPEAT, _MIRROR, _CLAMP = 0, 1, 2
 _WRAP = {"repeat": _REPEAT, "mirror": _MIRROR, "clamp": _CLAMP}
 # Values in column STORAGE.
 FLOATS, SRGB_BYTES, LINEAR_BYTES = 0, 1, 2
-# Rows of a level that are decoded in one step while the next level is computed; an even number.
+# Number of rows of a level that are decoded in one step to compute the next level. It must be even.
 _STRIP = 256
 
 
@@ -62,7 +63,7 @@ class TexturePack(NamedTuple):
 
 
 _LINEAR_BYTE = (np.arange(256) / np.float32(255.0)).astype(np.float32)
-# Linear value of each byte, (3, 256); the row is the value of STORAGE. Row 0 (FLOATS) is not used.
+# (3, 256): linear value of each byte, with one row for each value of STORAGE. Row 0 (FLOATS) is not used.
 _VALUE_OF_BYTE = np.stack([_LINEAR_BYTE, linear_from_srgb(np.arange(256) / 255.0), _LINEAR_BYTE])
 
 
@@ -107,7 +108,7 @@ def pack_textures(images: Sequence[PackImage]) -> TexturePack:
 
 
 def _empty_pack(images: Sequence[PackImage]) -> TexturePack:
-    """Return the pack of the images with the position of each level computed and all texels 0."""
+    """Return the pack of the images: the position of each level is computed, and all texels are 0."""
     count = max(len(images), 1)
     level = np.zeros((count, MAX_LEVELS, 3), np.int64)
     n_levels, wrap = np.zeros(count, np.int64), np.zeros((count, 4), np.int64)
@@ -235,7 +236,7 @@ def wrapped(i, n, mode):  # type: ignore[no-untyped-def]
 def _texel(pack, storage, at, c):  # type: ignore[no-untyped-def]
     """Return channel c of a texel, linear.
 
-    storage : FLOATS reads row `at` of `pack.pixels`, the other values read row `at` of `pack.coded`
+    storage : value of STORAGE; with FLOATS, row `at` of `pack.pixels` is read, else row `at` of `pack.coded`
     """
     if storage == FLOATS:
         return pack.pixels[at, c]

@@ -4,17 +4,21 @@
     T = (1 - a) lerp(1, c, a)                           a: alpha
     c = clamp(factor * texture * vertex colour, 0, 1)   colour of the surface
 
-Along a shadow ray, the filter function of Embree multiplies the T of all surfaces that the ray crosses
-(`alpha_filter`).
+Along a shadow ray, Embree's filter function multiplies the T of all BLEND surfaces that the ray crosses
+(`shading.kernels.alpha_filter`).
 
-A ray to its first hit passes each BLEND surface with probability 1 - a. Its light is then multiplied by
-lerp(1, c, a) for each surface that it passed. Embree calls the filter function for hits in any order,
-including hits beyond the first hit. Therefore the colours are multiplied along a second ray, which ends at
-the first hit of the first ray. The second ray is traced in a second tree that contains only the BLEND
+A ray that is traced to its first hit passes each BLEND surface with probability 1 - a. Its light is then
+multiplied by
+lerp(1, c, a) for each surface that it passed, so that its expected factor is T. Embree calls the filter
+function for
+hits in any order, including hits beyond the first hit. Therefore the colours are multiplied along a second
+ray, which
+ends at the first hit of the first ray. The second ray is traced in a second tree that contains only the BLEND
 triangles.
 
-The argument `blend` of these functions is a `BlendBuffers`, or None in scenes without BLEND surfaces. With
-None, Numba compiles them without the code for transmittance.
+The argument `blend` of the functions below is a `BlendBuffers`, or None in scenes without BLEND surfaces.
+With
+None, Numba compiles the functions without the code for transmittance.
 """
 
 from __future__ import annotations
@@ -61,9 +65,9 @@ class TransmittanceTable(NamedTuple):
     slot : (T,) int32
         Row in `row` of each triangle of the scene, -1 for all other triangles.
     row : (K, 21) float32
-        Data of the K triangles, see the column names.
+        Data of the K triangles: the columns of `AlphaTable.row`, then COLOUR to COLOUR_EDGE_2.
     coloured : bool
-        Whether the colour c of any of them is not white.
+        Whether the colour c of any of the K triangles is not white.
     """
 
     slot: NDArray[np.int32]
@@ -180,7 +184,7 @@ def _trace_blend_lanes(blend, function, width, on, rays, spare_on, spare, number
     """Call `_trace_blend` for sixteen rays, in packets of the native width.
 
     on : (16,) int32; rays : (21 * 16,) float32
-    number : 0 to multiply by lerp(1, c, a), PASSES to multiply by T
+    number : with 0, hits multiply the transmittance by lerp(1, c, a); with PASSES, by T
     spare_on, spare : `PacketBuffers.valid` and `.floats`, a packet of the native width
     """
     for first in range(0, PACKET_WIDTH, width):
@@ -245,10 +249,10 @@ def gather_turns(blend):
 def trace_gather(blend, turn, intersect, scene, width, query, on, rays, words, spare_on, spare):
     """Trace sixteen gather rays to their first hit.
 
-    In scenes with BLEND surfaces, each ray is traced twice. In turn 0 the ray stops at each BLEND surface
-    with probability alpha; hits on BLEND surfaces sample the light that these surfaces reflect. In turn 1 the
-    ray passes all BLEND surfaces where alpha < 1, and the light of its hit is multiplied by T of these
-    surfaces.
+    In scenes with BLEND surfaces, each ray is traced in two turns. In turn 0, the ray stops at each BLEND
+    surface with probability alpha. If it stops there, it samples the light that the BLEND surface reflects.
+    In turn 1, the ray passes all BLEND surfaces where alpha < 1. If its hit is not on a BLEND surface, the
+    light of the hit is multiplied by T of the surfaces that it passed.
 
     blend, scene, width, query, intersect : fields of `PacketBuffers`; turn : 0 or 1
     on : (16,) int32; rays, words : (21 * 16,) float32 and uint32; see `trace_lanes`
@@ -264,10 +268,10 @@ def trace_gather(blend, turn, intersect, scene, width, query, on, rays, words, s
 
 @inner
 def set_blend_rule(blend, words, number):
-    """Write the ID row of sixteen rays, which determines where they stop at BLEND surfaces (see `packets`).
+    """Write the ID row of sixteen rays, which determines where they stop at BLEND surfaces.
 
-    blend : BlendBuffers, or None: nothing is written
-    words : (21 * 16,) uint32, the packet; number : uint32, 0, `packets.UNAWARE` or `packets.SOLID`
+    blend : BlendBuffers; with None, nothing is written
+    words : (21 * 16,) uint32, the packet; number : uint32; 0, or UNAWARE or SOLID of `trace.packets`
     """
     if blend is None:
         return

@@ -23,7 +23,7 @@ from baker.trace.jit import inner, larger, smaller
 #     DOUBLE_SIDED           1 if the back has texel entries, else 0
 #     FACE_NORMAL            unit normal of the front, world (3)
 #     FACE_AREA              m2
-#     EMITTER                code of the triangle's emitters, see `emitters.emitter_at`; -1 for none
+#  EMITTER                code of the triangle's emitters, see `kernels.emitters.emitter_at`; -1 for none
 #     MATERIAL               number of the material, a whole number
 UV, UV_EDGE_1, UV_EDGE_2, PAGE, DOUBLE_SIDED = 0, 2, 4, 6, 7
 FACE_NORMAL, FACE_AREA, EMITTER, MATERIAL = 8, 11, 12, 13
@@ -39,11 +39,11 @@ class TriangleLookup(NamedTuple):
     Attributes
     ----------
     row : (T, 16) float32
-        One row per triangle, see the column names.
+        One row per triangle, columns UV to MATERIAL.
     size : int
         Width and height of a page, texels.
     n_pixels : int
-        Number of pixels of all pages. The back of pixel p has the number p + n_pixels.
+        Total number of pixels of all pages. The back of pixel p has the number p + n_pixels.
     """
 
     row: NDArray[np.float32]
@@ -51,8 +51,9 @@ class TriangleLookup(NamedTuple):
     n_pixels: int
 
 
-# The functions below take the fields of `TriangleLookup` as separate arguments. Passing the tuple would cost
-# an atomic reference count for each array and call, which tripled the time per hit.
+# The functions below take the fields of `TriangleLookup` as separate arguments. Passing the tuple costs an
+# atomic
+# reference count for each array and call, which tripled the time per hit.
 @inner
 def front_facing(row, prim, dx, dy, dz):
     """Return whether a ray of direction (dx, dy, dz) hits the front of triangle `prim`.

@@ -1,11 +1,13 @@
 """Builds the table of emitters: emissive triangles with their power, in clusters of neighbours.
 
-    power = pi area L        L: luminance, or mean of R, G and B of the radiance of a textured part
-
-The power of a two-sided triangle is twice as large. Textured triangles are cut into parts
-(`emissive_texture`), and each part is an emitter. A part has its exact mean radiance instead of the texture
-if the texture is constant in the part. The same applies if the texture has too much detail for the largest
-number of parts.
+    power = pi area L
+    L is the luminance of the radiance. For a part of a textured triangle, L is the mean of R, G and B. The
+    power of a
+    two-sided triangle is twice as large. Textured triangles are cut into parts (`lights.emissive_texture`),
+    and each part
+    is an emitter. If the texture is constant in a part, the part has its exact mean radiance instead of the
+    texture. So
+    has a part with too much detail that cannot be cut further, because the number of parts is limited.
 
 Based on: see `kernels.emitters`.
 """
@@ -37,19 +39,24 @@ from baker.kernels.shading import Shading
 from baker.lights.emissive_texture import EmissiveTextures, brightness, cut
 
 _LUMINANCE = np.array(LUMINANCE_WEIGHTS)
-# Largest number of clusters. It limits the time to compute the weights of clusters for each tile of texels.
+# Largest number of clusters. The time to compute the weights of clusters for a tile of texels is proportional
+# to it.
 MAX_CLUSTERS = 256
 # Largest number of parts of all textured triangles, minus the number of textured triangles.
 MOST_PARTS = 32768
-# Largest total weight of the parts of one triangle when clusters are formed. An uncut triangle has weight 1.
+# Largest total weight of the parts of one triangle. Clusters have about equal weights; an uncut triangle has
+# weight 1.
 _CROWD = 64.0
-# Limits of variance / mean^2 of the radiance in a part. Below the first limit (relative standard deviation
-# 0.001), the part has uniform radiance. Above the second limit, the part has its mean radiance, because most
-# texture samples would be black and no more parts were available to divide it.
+# Limits of variance / mean^2 of the radiance in a part. Up to _CONSTANT (relative standard deviation 0.001),
+# the
+# radiance is treated as uniform. Above _SPARSE, the part has its mean radiance, because most texture samples
+# would be
+# black, and no more parts were available to divide it.
 _CONSTANT, _SPARSE = 1.0e-6, 1.0
-# Longest edge of a part, as a share of the scene's diagonal, up to which the part has its mean radiance. It
-# must also be at most one texel of the texture wide. The difference is visible only from small distances, and
-# the mean has no noise.
+# Longest edge of a part, as a share of the scene's diagonal. Up to it, a part that is also at most one texel
+# of the
+# texture wide has its mean radiance: the difference is visible only from small distances, and the mean has no
+# noise.
 _SMALL = 1.0 / 128.0
 
 
@@ -60,8 +67,8 @@ class _Pieces:
     triangle : (m,) int64, triangle of the scene
     inside : (m, 3) float64, see `emissive_texture.Parts`
     radiance : (m, 3) float64, mean radiance, cd/m2
-    brightness : (m,) float64, luminance, or mean of R, G and B of a part; cd/m2
-    textured : (m,) bool, whether the texture is looked up
+    brightness : (m,) float64, cd/m2; luminance of whole triangles, mean of R, G and B of parts
+    textured : (m,) bool, whether the radiance is looked up in the texture; else it is `radiance`
     node (k, 4), root (T,) int32 : see `Emitters`, with indices of these m emitters
     """
 
@@ -161,8 +168,8 @@ def _find_pieces(geometry: Geometry, shading: Shading, most_parts: int) -> _Piec
     )
     untextured = candidate[~textured]
     root[untextured] = np.arange(len(untextured))
-    # Look up the texture in all parts of triangles with alpha, because radiance and alpha of the same point
-    # are multiplied.
+    # In triangles with alpha, look up the texture in all parts: radiance and alpha may vary together, so they
+    # must be multiplied at the same point.
     varied = (parts.spread > _CONSTANT) & (parts.spread <= _SPARSE)
     if len(shading.alpha.slot):
         varied |= shading.alpha.slot[image][parts.owner] >= 0

@@ -1,8 +1,10 @@
 """Textured emission: divides triangles into parts of low variance, with exact mean radiance.
 
-A triangle is cut at the midpoints of its edges into four parts. The parts with the largest product of power
-and variance of the texture are cut again. Black parts are dropped. Uniformly distributed points of the
-remaining parts are then samples of low variance.
+A triangle is cut at the midpoints of its edges into four parts. The parts that cause most noise are cut
+again. Black
+parts are dropped. Uniformly distributed points of the remaining parts are then samples of low variance. The
+noise of
+a triangle is
 
     noise = sum share (E[L^2] / E[L]^2 - 1)
 
@@ -26,26 +28,35 @@ from baker.kernels.textures import TexturePack
 from baker.lights.texture_levels import TextureLevels, fair_limit
 from baker.lights.uv_integral import uv_means
 
-# Noise (see the module) up to which a triangle is not cut further.
+# Noise of a triangle, as the module defines it. Up to it, the triangle is not cut further.
 ENOUGH = 0.05
-# Edge length of a part, as a share of its triangle's edge, at which the part is not cut further. float32
+# Edge length of a part, as a share of its triangle's edge. A part this small is not cut further, because
+# float32
 # barycentrics would not distinguish smaller parts.
 _SMALLEST = 2.0**-14
-# Share of the largest gain (noise times weight) above which parts are cut in the same round.
+# Gain (noise times weight) of a part, as a share of the largest gain. Parts above it are cut in the same
+# round.
 _TOGETHER = 0.125
-# MOST_CROSSED: total number of texel lines (borders between texels) that the edges of all parts may cross.
-# This limits the time to about a second. Beyond it, parts are averaged over a smaller version of their
-# texture. FEW_CROSSED: number of crossed texel lines up to which a part always uses the full resolution.
+# MOST_CROSSED: total number of texel lines (borders between two rows or columns of texels) that the edges of
+# all parts
+# may cross, which limits the time to about a second. To stay below it, means of parts are computed from a
+# smaller
+# version of their texture. FEW_CROSSED: number of texel lines that the edges of one part cross. Up to it, the
+# part
+# always uses the full resolution.
 MOST_CROSSED, FEW_CROSSED = 4.0e6, 64.0
-# Share of the remaining texel lines that one round of cutting may always cross.
+# Share of the remaining number of texel lines that each round of cutting may cross, even if many rounds
+# follow.
 _ROUND = 0.25
-# Texel lines that are crossed in one call of the kernel. Signals such as Ctrl-C are handled between calls.
+# Number of texel lines that the parts of one call of the kernel cross. Signals such as Ctrl-C are handled
+# between
+# calls.
 _CALL = 2.5e5
 
 
 @dataclass(frozen=True)
 class Parts:
-    """The m parts of n textured triangles that are not black.
+    """The m parts that are not black, of n textured triangles.
 
     Attributes
     ----------
@@ -54,7 +65,7 @@ class Parts:
     inside : (m, 3) float64
         Barycentrics b1, b2 of the part's corner 0 in its triangle, and its size. Barycentrics (u, v) of the
         part are (b1 + size u, b2 + size v) in the triangle. The size is the part's edge length divided by the
-        triangle's, negative if the part is rotated by 180 degrees.
+        triangle's edge length, negative if the part is rotated by 180 degrees.
     mean : (m, 3) float64
         Mean radiance, cd/m2.
     spread : (m,) float64
@@ -96,9 +107,9 @@ class EmissiveTextures:
         kinds, kind = np.unique(key, axis=0, return_inverse=True)
         self.kind = kind.reshape(-1)
         self.levels = [TextureLevels(pack, int(row[0]), row[1:] ** 2) for row in kinds]
-        # Number of texel lines that may still be crossed.
+        # Remaining number of texel lines that edges of parts may cross.
         self.left = MOST_CROSSED
-        # (n,) width or height of each triangle's uv bounding box in texels, the larger of both.
+        # (n,) the larger of width and height of each triangle's bounding box in uv, in texels.
         self.texels = np.zeros(len(uv))
         self._bring_near()
 
@@ -131,8 +142,8 @@ class EmissiveTextures:
         """Return `mean` (m, 3) and `spread` (m,) of parts, see `Parts`.
 
         owner (m,), inside (m, 3) : see `Parts`
-        ahead : largest number of parts in this call and all later calls together, which determines the share
-            of the remaining texel lines that this call may cross
+        ahead : largest number of parts in this call and all later calls together; it determines the share of
+            the remaining texel lines that the parts of this call may cross
         """
         corner = self.uv[owner]
         edge = corner[:, 1:] - corner[:, :1]
@@ -167,7 +178,8 @@ class EmissiveTextures:
 
 
 def brightness(radiance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the mean of R, G and B. With luminance instead, parts that emit blue would get few samples.
+    """Return the mean of R, G and B of radiances.
+    Luminance is not used, because parts that emit blue would get few samples.
 
     Parameters
     ----------
@@ -195,8 +207,8 @@ def cut(
     area : (n,) float64, m2
         Areas of the triangles.
     finest : (n,) float64
-        Size (see `Parts.inside`) up to which parts are treated as uniform, if they are also at most one texel
-        wide.
+        Size (see `Parts.inside`). Parts up to this size that are at most one texel wide are treated as
+        uniform.
     most : int
         Largest number of parts, minus n.
 
@@ -211,7 +223,7 @@ def cut(
     finest = np.minimum(finest, 1.0 / np.maximum(textures.texels, 1e-300))
     mean, spread = _means_of_parts(textures, owner, inside, finest, n + 4 * max(most // 3, 0))
     whole = area * brightness(mean)
-    # Weight triangles half by power and half equally, so that emitters of dim rooms are cut, too.
+    # Weight triangles half by power and half equally, so that triangles of low power are cut, too.
     lit = max(int((whole > 0).sum()), 1)
     weight = 0.5 * whole / max(float(whole.sum()), 1e-300) + 0.5 / lit
     child = np.full(n, -1, np.int64)

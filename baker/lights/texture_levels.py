@@ -1,9 +1,12 @@
 """Emissive textures at lower resolutions, for triangles whose edges cross too many texel lines.
 
 A texel line is a border between two rows or columns of texels. Each texel of a smaller texture contains the
-exact mean of the original texture over its area (RGB). The fourth column contains the variance inside this
-area. Width and height are halved independently. So a narrow triangle across many repeats loses resolution
-only along its length.
+mean RGB of
+the original texture over its area, and, in the fourth column, the variance of the original texture inside
+this
+area. Width and height are halved independently. So a long narrow triangle that crosses many repeats of the
+texture
+loses resolution only along its length.
 
 Based on: Heckbert, Survey of texture mapping, 1986 (box-filtered levels).
 """
@@ -19,15 +22,19 @@ from baker.kernels.textures import HEIGHT, STORAGE, WIDTH, TexturePack, decoded,
 from baker.lights.uv_integral import BLOCK, N_SUMS, RowSums, fill_row_sums
 
 _CLAMP = 2
-# Width or height of an emissive image, texels, above which a coarser mip level is used, if its width and
-# height are even.
+# Width or height of a mip level, texels. Above it, the next coarser level is used instead, if width and
+# height are
+# even. (If one is odd, the next level omits the last row or column and has different means.)
 LARGEST_SIDE = 2048
 # Largest number of rows or columns that are averaged in one step, which limits the working memory.
 _STRIP = 256
 
 
 class Level(NamedTuple):
-    """A texture at one resolution: pixels (h * w, 4) float32, w and h in texels, running sums of the rows."""
+    """A texture at one resolution.
+
+    pixels : (h * w, 4) float32; w, h : width and height, texels; sums : running sums along the rows
+    """
 
     pixels: NDArray[np.float32]
     w: int
@@ -41,15 +48,15 @@ class TextureLevels:
     def __init__(self, pack: TexturePack, texture: int, weight: NDArray[np.float64]) -> None:
         """Prepare a texture.
 
-        texture : number of the texture in `pack`; weight : (3,) factors of R^2, G^2 and B^2 in sums of
-            squares
+        texture : number of the texture in `pack`
+        weight : (3,) factors of R^2, G^2 and B^2 in sums of squares
         """
         finest = finest_level(pack, texture, weight)
         self.wrap = pack.wrap[texture]
         self.size = np.array([finest.w, finest.h])
         self._texture, self._weight = texture, weight
         self._made = {(0, 0): finest}
-        # The widths of all levels down to one texel, then the heights.
+        # List of the widths of all levels down to one texel, and list of the heights.
         self._sizes = [_halvings(finest.w), _halvings(finest.h)]
 
     def at(self, along_u: int, along_v: int) -> Level:
@@ -69,12 +76,12 @@ class TextureLevels:
         return self._made[key]
 
     def crossed(self, uv: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return (n, 2) float64: the texel lines that each triangle's edges cross along u, and along v.
+        """Return (n, 2) float64: the numbers of texel lines that each triangle's edges cross along u and v.
 
         uv : (n, 3, 2) float64, corners of the triangles
         """
         lines = np.abs(uv - uv[:, [1, 2, 0]]) * self.size
-        # Limit the number for clamped axes, because there are no texel lines outside the texture.
+        # For clamped axes, limit the number, because there are no texel lines outside the texture.
         most = np.where(self.wrap[:2] == _CLAMP, self.size + 2.0, np.inf)
         total: NDArray[np.float64] = np.minimum(lines, most).sum(axis=1)
         return total
@@ -87,20 +94,21 @@ class TextureLevels:
         Parameters
         ----------
         lines : (n, 2) float64
-            Texel lines crossed at the finest resolution, see `crossed`.
+            Numbers of texel lines that the triangles cross at the finest resolution, from `crossed`.
         most : float
             Largest number of texel lines crossed by one triangle.
 
         Returns
         -------
         halved : (n, 2) int64
-            Number of halvings along u and v. If it is one more than the axis allows, the texture is treated
-            as constant along the axis (`is_constant`).
+            Number of halvings along u and along v. If it is one more than the number of halvings to one
+            texel, the texture is treated as constant along that axis (`is_constant`).
         crossed : (n,) float64
-            Texel lines crossed at that resolution.
+            Number of texel lines that each triangle crosses at the chosen resolution.
         """
         halved = np.zeros((len(lines), 2), np.int64)
-        # Compute the share of the lines that remains at each level, and 0 for a constant axis.
+        # Compute the share of the texel lines that remains after each number of halvings; 0 for a constant
+        # axis.
         left = [np.append(np.array(sizes) / sizes[0], 0.0) for sizes in self._sizes]
         now = lines.copy()
         while len(over := np.flatnonzero(now.sum(axis=1) > most)):
@@ -123,7 +131,8 @@ def fair_limit(wanted: NDArray[np.float64], total: float) -> float:
     """
     ascending = np.sort(wanted)
     before = np.concatenate([[0.0], np.cumsum(ascending)[:-1]])
-    # Compute the limit for the case that amount k and all larger amounts exceed it.
+    # equal[k] is the limit x if exactly the k smallest amounts are below x: sum of these k amounts + (n - k)
+    # x = total.
     equal = (total - before) / np.arange(len(wanted), 0, -1)
     short = np.flatnonzero(equal < ascending)
     return float(equal[short[0]]) if len(short) else np.inf
@@ -132,8 +141,8 @@ def fair_limit(wanted: NDArray[np.float64], total: float) -> float:
 def finest_level(pack: TexturePack, texture: int, weight: NDArray[np.float64]) -> Level:
     """Return the mip level of a texture from which the means of its emission are computed.
 
-    This is the finest level whose width and height are at most `LARGEST_SIDE` texels, or the first level of
-    odd width or height, whichever comes first.
+    This is the finest level whose width and height are at most `LARGEST_SIDE` texels. If a finer level has
+    odd width or height, that level is returned instead.
 
     Parameters
     ----------

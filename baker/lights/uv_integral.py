@@ -1,9 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Exact means of a texture over triangles in uv space, smaller than a texel or larger than the texture.
+"""Exact means of a texture over triangles in uv space, of any size.
 
     integral of f over a triangle = closed integral of F(x, y) dy along its edges,   dF / dx = f     (Green)
 
-f is the filtered texture, and x and y are in texels. Between two texel borders, F along an edge is a
+f is the filtered texture, and x and y are in texels. Along an edge, between two borders of texels, F is a
 polynomial of degree 3 at most, so Simpson's rule is exact. F is computed from running sums along each row of
 texels. The computing time is proportional to the number of texels that the *edges* cross, not to the area.
 
@@ -21,19 +21,24 @@ from numpy.typing import NDArray
 from baker.kernels.textures import wrapped
 from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
-# Distance, texels, between the stored running sums of a row. The texels between are added on demand.
+# Distance, texels, between the stored running sums of a row. Sums at other texels are computed on demand from
+# these.
 BLOCK = 32
 # Number of columns of f: red, green, blue, and the weighted sum of their squares.
 N_SUMS = 4
-# area / (longest edge)^2 up to which a triangle is integrated along its longest edge.
+# area / (longest edge)^2 of a triangle. Up to it, the triangle is treated as degenerate: it is integrated
+# along its
+# longest edge.
 _THIN = 1.0e-9
-# Largest side of a triangle's uv bounding box, texels, up to which the spread of a bilinear texture is
-# estimated from sixteen points.
+# Largest side of a triangle's uv bounding box, texels. Up to it, the spread of a bilinear texture is
+# estimated from
+# sixteen points.
 _FEW_CELLS = 3.0
-# integral / (sum of the magnitudes of its terms) below which an integral is treated as rounding error and set
+# integral / (sum of the magnitudes of its terms). Up to it, an integral is treated as rounding error and set
 # to 0.
 _ROUNDING = 1.0e-12
-# Spread of a triangle whose mean is positive although the texture is black at all sixteen points.
+# Spread (variance / mean^2) that a triangle gets if its mean is positive but the texture is black at all
+# sixteen points.
 _UNSEEN = 15.0
 _four, _prefix, _texel = scratch((4,), np.float64), scratch((4,), np.float64), scratch((4,), np.float64)
 _row_terms = scratch((2, 3, 4), np.float64)
@@ -43,8 +48,8 @@ _corner_memory, _totals, _sizes = (scratch(shape, np.float64) for shape in ((3, 
 class RowSums(NamedTuple):
     """Running sums along the rows of one texture at one resolution.
 
-    block : (H, W // 32 + 1, 4) float64, sums of texels 0 to 32 b - 1 of each row; columns R, G, B, and the
-        weighted sum of their squares
+    block : (H, W // 32 + 1, 4) float64; item [j, b] is the sum over the texels 0 to 32 b - 1 of row j, of R,
+        G, B and the weighted sum of their squares
     weight : (4,) float64, factors of R^2, G^2 and B^2 in the sum of squares; then 1 if column 3 of the pixels
         is the variance inside each texel, else 0
     texture : int, number of the texture in its `TexturePack`
@@ -59,8 +64,8 @@ class RowSums(NamedTuple):
 def fill_row_sums(pixels, offset, weight, block):
     """Write `block`, see `RowSums`, for the texture whose texels begin at `pixels[offset]`.
 
-    Texels are added in the same order as in `_sum_before`, so that sums over black texels are equal bit for
-    bit.
+    Texels are added in the same order as in `_sum_before`. So the running sums before and after black texels
+    are equal bit for bit.
 
     pixels : (H * W, 4) float32; offset : index of the first texel; weight : (4,) float64, see `RowSums`
     """
@@ -122,7 +127,8 @@ def _read(pixels, w, weight, j, i, out):
 def _running(pixels, w, weight, block, mode, j, i, out, spare):
     """Write the sums of row j from column 0 to column i - 1, for any integer i, to `out` (4,) float64.
 
-    Outside the texture, the row is continued by the wrap mode. For negative i, the sums are negative.
+    The wrap mode continues the row outside the texture. For negative i, the result is minus the sum of
+    columns i to -1.
 
     pixels : (H * W, 4) float32; weight, block : see `RowSums`; mode : see `TexturePack.wrap`
     spare : (4,) float64, working memory
@@ -151,8 +157,8 @@ def _running(pixels, w, weight, block, mode, j, i, out, spare):
 def _value(pixels, w, h, weight, wrap, nearest, x, y, out, spare):
     """Write R, G, B of the filtered texture at (x, y), and the weighted sum of their squares, to `out` (4,).
 
-    x, y : texels; whole numbers at texel centres with bilinear filtering, at texel borders with nearest
-        filtering
+    x, y : texels. With bilinear filtering, whole numbers are texel centres; with nearest filtering, texel
+        borders
     pixels : (H * W, 4) float32; weight : (4,) float64, see `RowSums`; wrap : (3,) int64
     spare : (4,) float64, working memory
     """
@@ -179,8 +185,8 @@ def _value(pixels, w, h, weight, wrap, nearest, x, y, out, spare):
 def _load_cell(pixels, w, h, weight, block, wrap, nearest, first, i, j, terms, a, b):
     """Write the coefficients of F in cell (i, j), the square from (i, j) to (i + 1, j + 1).
 
-    terms : (2, 3, 4) float64 output; for rows j and j + 1, the integral from column `first` to column i, the
-        texel in column i, and the texel in column i + 1
+    terms : (2, 3, 4) float64 output; for each of the rows j and j + 1: the integral from column `first` to
+        column i, the texel in column i, and the texel in column i + 1
     pixels : (H * W, 4) float32; weight, block : see `RowSums`; wrap : (3,) int64
     a, b : (4,) float64, working memory
     """
@@ -196,7 +202,7 @@ def _load_cell(pixels, w, h, weight, block, wrap, nearest, first, i, j, terms, a
         for c in range(4):
             terms[r, 1, c] = terms[r, 2, c] = a[c]
         if not nearest:
-            # Convert the sum to an integral between texel centres by the trapezoidal rule.
+            # Convert the sum to an integral between texel centres, by the trapezoidal rule.
             _read(pixels, w, weight, line, wrapped(first, w, wrap[0]), b)
             for c in range(4):
                 terms[r, 0, c] += 0.5 * (a[c] - b[c])
@@ -218,9 +224,9 @@ def _primitive(terms, nearest, c, fx, fy):
 
 @inner
 def _next(at, step, start, low, high):
-    """Return the parameter t at which the coordinate start + t step of an edge reaches the texel line `at`.
+    """Return the parameter t at which the coordinate start + t step of an edge reaches the texel border `at`.
 
-    Returns 2 if `step` is 0, or if `at` is beyond the last line between `low` and `high`.
+    Returns 2 if `step` is 0, or if the edge has passed the last border in the range `low` to `high`.
     """
     if step == 0.0 or (step > 0.0 and at > high) or (step < 0.0 and at < low):
         return 2.0
@@ -233,16 +239,16 @@ def _walk(pixels, w, h, weight, block, wrap, nearest, first, ends, along, total,
 
     pixels : (H * W, 4) float32; weight, block : see `RowSums`; wrap : (3,) int64
     first : column from which F is integrated
-    ends : six float: x0, y0, x1, y1 of the ends in texels, and the weights of f at both ends
-    along : bool; if true, the integral of f along the edge, with linearly interpolated weights, is added,
-        otherwise the integral of F dy
+    ends : six float: x0, y0, x1, y1 of the ends, texels, and the weight of f at each end
+    along : bool; if true, the integral of f times the linearly interpolated weight along the edge is added,
+        else the integral of F dy
     """
     x0, y0, x1, y1, first_weight, last_weight = ends
     dx, dy = x1 - x0, y1 - y0
     if not along and dy == 0.0:
         return
     terms, a, b = _row_terms(), _prefix(), _texel()
-    # Consider only texel lines inside the texture if it is clamped.
+    # If the texture is clamped, consider only borders of texels near the texture.
     low_x, high_x = (-1.0, w + 1.0) if wrap[0] == 2 else (-1.0e30, 1.0e30)
     low_y, high_y = (-1.0, h + 1.0) if wrap[1] == 2 else (-1.0e30, 1.0e30)
     line_x = math.floor(x0) + 1.0 if dx > 0.0 else math.ceil(x0) - 1.0
@@ -263,7 +269,7 @@ def _walk(pixels, w, h, weight, block, wrap, nearest, first, ends, along, total,
         if along:
             for k in range(3):
                 s = t if k == 0 else (middle if k == 1 else end)
-                # Evaluate f just inside the piece, because two texels meet at its ends.
+                # Evaluate f just inside the interval from t to end, because two texels meet at its ends.
                 inside = middle + (s - middle) * (1.0 - 1.0e-9)
                 _value(pixels, w, h, weight, wrap, nearest, x0 + inside * dx, y0 + inside * dy, a, b)
                 share = (4.0 if k == 1 else 1.0) / 6.0 * (end - t)
@@ -323,8 +329,8 @@ def uv_means(uv, pixels, w, h, wrap, weight, block, mean, spread):
     wrap : (3,) int64, see `TexturePack.wrap`
     weight, block : see `RowSums`
     mean : (n, 3) float64 output, RGB, exact up to rounding
-    spread : (n,) float64 output, weighted variance / mean^2 of the texture; with a bilinear texture it is an
-        estimate for triangles at most `_FEW_CELLS` wide, and an upper bound for larger triangles
+    spread : (n,) float64 output, weighted variance / mean^2 of the texture. If the texture is bilinear, it is
+        an estimate for triangles at most `_FEW_CELLS` wide, and an upper bound for wider triangles
     """
     nearest = wrap[2] != 0
     shift = 0.0 if nearest else 0.5
@@ -348,8 +354,8 @@ def uv_means(uv, pixels, w, h, wrap, weight, block, mean, spread):
             area = 1.0
         elif thin:
             # Integrate a degenerate triangle along its longest edge. The weight of f is proportional to the
-            # triangle's width there: it rises linearly from 0 to the projection of corner `top`, and falls to
-            # 0.
+            # triangle's width: it rises linearly from 0 at one end to the projection of corner `top`, then
+            # falls to 0 at the other end.
             p, q = (top + 1) % 3, (top + 2) % 3
             way_x, way_y = corner[q, 0] - corner[p, 0], corner[q, 1] - corner[p, 1]
             at = (corner[top, 0] - corner[p, 0]) * way_x + (corner[top, 1] - corner[p, 1]) * way_y

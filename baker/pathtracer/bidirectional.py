@@ -3,12 +3,14 @@
 
 The eye is a camera or a surface point. Each sample traces a subpath from a light and stores its vertices,
 then traces a subpath from the eye. Every eye vertex is connected to a sampled light and to all stored
-vertices. If the eye is a camera, stored vertices are connected to its pinhole as well. The light of such a
-connection is a *splat*: it is added to the pixel in which the vertex is visible. `bidirectional_weights`
-computes MIS weights.
+vertices. If the eye is a camera, the vertices of light subpaths are connected to its pinhole as well. The
+light of a
+connection to the pinhole is a *splat*: it is added to the pixel in which the vertex is visible.
+`bidirectional_weights` computes MIS weights.
 
-A light subpath has at most `MAX_LIGHT_VERTICES` vertices. Eye subpaths end by Russian roulette. The MIS
-weights include only techniques that exist within this limit.
+A light subpath has at most `MAX_LIGHT_VERTICES` vertices, and the MIS weights include only techniques within
+this
+limit. Eye subpaths end by Russian roulette.
 
 Based on: Lafortune and Willems, Bi-directional path tracing, 1993; Veach and Guibas, Bidirectional estimators
 for light transport, 1994; Dutre, Lafortune and Willems, Monte Carlo light tracing with direct computation of
@@ -112,7 +114,8 @@ def start_at_eye(path, row, lane, where, toward, normal, camera, n_subpaths, siz
 
 @inner
 def scatter_both(path, row, lane, eye, choice, u, w, value, spare):
-    """Sample the next direction of a subpath, and update its throughput and MIS sums; False if it ends.
+    """Sample the next direction of a subpath, and update its throughput and MIS sums.
+    Returns False if the subpath ends.
 
     path : (N_ROWS_BOTH, n) float64; row : (5, n) float64; eye : whether the subpath started at the eye
     choice, u, w : random numbers in [0, 1), see `bsdf_sample`; value, spare : (3,) float64, working memory
@@ -131,8 +134,8 @@ def scatter_both(path, row, lane, eye, choice, u, w, value, spare):
         density = reverse = 1.0
         shaded = bx * path[SHADED, lane] + by * path[SHADED + 1, lane] + bz * path[SHADED + 2, lane]
         if shaded <= GRAZE:
-            # `arrive` replaced the shading normal for this view direction. A subpath from the other end would
-            # use another normal, so it cannot sample this reflection.
+            # `vertex.arrive` replaced the shading normal for this view direction by the geometric normal. A
+            # subpath from the other end would use another normal, so it cannot sample this reflection.
             if not eye:
                 return False
             reverse = 0.0
@@ -160,7 +163,7 @@ def connect(path, row, lane, kept, kept_row, k, s, value, spare, ray):
     """Connect the end of an eye subpath to the stored vertex in column k; return False if no light arrives.
 
     path, kept : (N_ROWS_BOTH, n) float64, the eye subpath and the stored vertices
-    row, kept_row : (5, n) float64, BSDF parameters of both
+    row, kept_row : (5, n) float64, BSDF parameters of the vertices of `path` and `kept`
     s : number of vertices of the light subpath up to the stored vertex
     value : (3,) float64, output, MIS-weighted light if nothing blocks the connection
     spare : (3,) float64, working memory
@@ -197,11 +200,11 @@ def connect(path, row, lane, kept, kept_row, k, s, value, spare, ray):
 
 @inner
 def show(path, row, lane, camera, n_subpaths, value, ray):
-    """Connect the end of a light subpath to the camera; return the number of its pixel, or -1 if invisible.
+    """Connect the end of a light subpath to the camera; return its pixel, or -1 outside the picture.
 
     path : (N_ROWS_BOTH, n) float64; row : (5, n) float64; camera, n_subpaths : see `trace_both_ways`
-    value : (3,) float64, output, MIS-weighted splat if nothing blocks the connection. The radiance of a pixel
-        is the sum of its splats from the light subpaths of all pixels
+    value : (3,) float64, output, MIS-weighted splat if nothing blocks the connection. A pixel's radiance is
+        the sum of its splats, from the light subpaths of all pixels
     ray : (6,) float64, output, from the vertex to the camera, see `connect`
     """
     for a in range(3):
@@ -241,9 +244,9 @@ def trace_both_ways(
 
     where, toward, normal, begin, surfaces, lights, shading, sobol_points, settings, out : see `trace_paths`
     buffers : `PacketBuffers`
-    camera : (15,) float64, see `camera`; unused if paths start at surface points
-    n_subpaths : float, number of pixels of the picture, which is the number of light subpaths for each sample
-        of a pixel; 0 if paths start at surface points
+    camera : (15,) float64, from `camera.camera_columns`; unused if paths start at surface points
+    n_subpaths : float, number of pixels of the picture. As each sample of each pixel traces a light subpath,
+        it is also the number of light subpaths per sample. 0 if paths start at surface points
     sphere : (4,) float64, `Reference.sphere`
     splat_pixel : (q,) int64, output, number of the pixel of each splat, which may be outside this tile
     splat : (q, 3) float64, output, light of each splat, in the unit of `out`. With a camera, q must be at
@@ -275,8 +278,8 @@ def trace_both_ways(
     path, row, kept, kept_row = _new_path(), _new_row(), _new_kept(), _new_kept_row()
     # For each lane, number of vertices of its light subpath, including the vertex on the light.
     count = _new_numbers()
-    # For each lane: whether it traces an eye subpath; largest component of the throughput at the start of its
-    # light subpath; 1 / range^2 of that light.
+    # For each lane: whether it traces an eye subpath; the largest component of the throughput at the start of
+    # its light subpath; 1 / range^2 of the light at which the light subpath starts.
     eye, first, inverse_range = _new_flags(), _new_first(), _new_first()
     value, spare, ray, rgba, spot = _new_value(), _new_value(), _new_ray(), _new_rgba(), _new_spot()
     values, state = _new_values(), _new_state()
@@ -387,8 +390,8 @@ def trace_both_ways(
                 for r in range(N_PARAMETERS):
                     kept_row[r, k] = row[r, lane]
             stage[lane] = _VERTEX if alive else _IDLE
-        # Cast connections. Step 0: from an eye subpath to a light, from a light subpath to the camera. Step
-        # i: from an eye subpath to stored vertex i
+        # Trace connections. Step 0 connects eye subpaths to sampled lights, and light subpaths to the camera.
+        # Step i connects eye subpaths to their stored vertex i
         step = 0
         while step < MAX_LIGHT_VERTICES:
             any_shadow = more = False

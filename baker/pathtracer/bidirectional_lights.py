@@ -1,11 +1,12 @@
 # mypy: disable-error-code="no-untyped-def"
 """Lights in bidirectional path tracing: starts of light subpaths, light samples, hits on emitters and sky.
 
-A light is chosen as in `light_table`. Where a light subpath starts depends on the light:
+A light is chosen as in `pathtracer.light_table`. A light subpath starts,
 
-- Emitter: at a point chosen uniformly, in a cosine-weighted direction.
-- Light with a position: at that position, in a direction uniform over its cone.
-- Parallel light and the sky: on a disc of the radius of `Reference.sphere`, in front of the scene.
+- at an emitter: from a uniformly chosen point, in a cosine-weighted direction;
+- at a light with a position: from that position, in a direction uniform over its cone;
+- for parallel light and the sky: from a uniformly chosen point of a disc in front of the scene. The disc has
+  the radius of the scene's bounding sphere (`Reference.sphere`).
 
 Based on: Veach, Robust Monte Carlo methods for light transport simulation, 1997, ch. 10.3; Pharr, Jakob and
 Humphreys, Physically based rendering, 3rd ed. 2016, ch. 16 (light from infinity).
@@ -85,9 +86,9 @@ def to_world(nx, ny, nz, a, b, c):
 
 @inner
 def start_density(delta, e):
-    """Return the density, per steradian, of the directions of light subpaths that start at light e.
+    """Return the density, per steradian, of a light subpath's directions from light e, which has a position.
 
-    delta : (P, 20) float64, see `LightTable`; row e is a light with a position
+    delta : (P, 20) float64, see `LightTable`; e : row of the light
     """
     if delta[e, DELTA_FORM] == EVEN:
         return _INV_4_PI
@@ -101,8 +102,8 @@ def start_at_light(path, lane, lights, sphere, min_offset_scale, choice, u, w, a
     path : (N_ROWS_BOTH, n) float64; lights : `LightTable`; sphere : (4,) float64, `Reference.sphere`
     min_offset_scale : metres, see `Surfaces`
     choice, u, w, a, b : random numbers in [0, 1): for the light, a point (u, w) and a direction (a, b)
-    spot : (2,) float64, output, barycentrics of the start on an emitter. The caller multiplies by the
-        emitter's texture
+    spot : (2,) float64, output, barycentrics of the start on an emitter. The caller multiplies the throughput
+        by the emitter's texture there
 
     Returns
     -------
@@ -139,8 +140,8 @@ def start_at_light(path, lane, lights, sphere, min_offset_scale, choice, u, w, a
         dx, dy, dz = to_world(nx, ny, nz, dx, dy, dz)
         path[DENSITY, lane] = max(cosine, 1.0e-12) * INV_PI / sides
         path[LEAVE, lane] = cosine
-        # Sum for the technique in which the eye subpath hits the emitter: 1 / density of the start.
-        # `reach_vertex` multiplies by the cosine at the light.
+        # MIS sum for the technique in which the eye subpath hits the emitter: 1 / density of the start.
+        # `reach_vertex` multiplies it by the cosine at the light.
         path[CHAIN, lane] = 1.0 / density
         scale = math.pi * sides / density
         red, green, blue = (
@@ -191,7 +192,7 @@ def start_at_light(path, lane, lights, sphere, min_offset_scale, choice, u, w, a
 
 @inner
 def range_of_light(lights, light):
-    """Return 1 / range^2, 1/m2, of light number `light`; 0 if the light has no range.
+    """Return 1 / range^2, in 1/m2, of light number `light`; 0 if the light has no range.
 
     lights : `LightTable`
     """
@@ -203,9 +204,9 @@ def range_of_light(lights, light):
 
 @inner
 def fade(path, lane, distance, inverse_range):
-    """Multiply the throughput of a light subpath by the range window at its first hit.
+    """Multiply the throughput of a light subpath by the light's `range_window` at its first hit.
 
-    Densities do not change. Returns False if the throughput becomes 0.
+    The sampling densities do not change. Returns False if the throughput becomes 0.
 
     path : (N_ROWS_BOTH, n) float64; distance : metres from the light
     inverse_range : 1 / range^2, 1/m2
@@ -218,7 +219,9 @@ def fade(path, lane, distance, inverse_range):
 
 @inner
 def start_on_disc(path, lane, sphere, dx, dy, dz, u, w):
-    """Write a start for light of direction d: a uniform point on a disc that touches the scene's sphere.
+    """Write the start of a light subpath of direction d: a uniform point on a disc in front of the scene.
+    The disc is perpendicular to d and touches the scene's bounding sphere.
+
 
     path : (N_ROWS_BOTH, n) float64; sphere : (4,) float64, `Reference.sphere`
     u, w : random numbers in [0, 1)
@@ -238,7 +241,7 @@ def start_on_disc(path, lane, sphere, dx, dy, dz, u, w):
 
 @inner
 def aim_both_ways(path, row, lane, lights, sphere, choice, u, w, value, ray):
-    """Do what `vertex.aim` does, at the end of an eye subpath and with the MIS weight of all techniques.
+    """Sample a light from the end of an eye subpath; like `vertex.aim`, with MIS weights of all techniques.
 
     path : (N_ROWS_BOTH, n) float64; row : (5, n) float64; sphere : (4,) float64, `Reference.sphere`
     choice, u, w : random numbers in [0, 1); value : (3,), ray : (6,) float64, outputs, see `vertex.aim`
@@ -258,8 +261,8 @@ def aim_both_ways(path, row, lane, lights, sphere, choice, u, w, value, ray):
         dx, dy, dz = dx / length, dy / length, dz / length
         max_distance = length * SHORT
         scale = 1.0 / density
-        # Density, per area, with which a subpath from the light samples this vertex, without the cosine at
-        # this vertex.
+        # Density, per area, with which a subpath from the light samples this vertex; the cosine at this
+        # vertex is multiplied in below.
         onward = emitter_cosine(emitter, light, dx, dy, dz) * emission_density(emitter, light) / square
         red, green, blue = (
             emitter[light, EMITTER_RADIANCE],
@@ -304,7 +307,7 @@ def aim_both_ways(path, row, lane, lights, sphere, choice, u, w, value, ray):
 
 @inner
 def emitter_cosine(emitter, e, dx, dy, dz):
-    """Return the cosine at emitter e of a ray that arrives in unit direction d; negative on its dark side.
+    """Return the cosine at emitter e of a ray that arrives in unit direction d; negative on a dark side.
 
     emitter : (E, 24) float64, see `emitters`
     """
@@ -318,7 +321,7 @@ def emitter_cosine(emitter, e, dx, dy, dz):
 
 @inner
 def emission_density(emitter, e):
-    """Return the density, per projected solid angle, of the directions of light subpaths from emitter e.
+    """Return the density, per projected solid angle, of a light subpath's directions from emitter e.
 
     emitter : (E, 24) float64, see `emitters`
     """
@@ -334,8 +337,8 @@ def meet_emitter(path, lane, surface, prim, emitter, e, seen, value):
     path : (N_ROWS_BOTH, n) float64; surface : (T, 32) float32, see `Surfaces`
     emitter : (E, 24) float64, see `emitters`
     e : number of the emitter that was hit, -1 if no light subpath starts there
-    seen : whether the ray comes from the camera directly. No other technique makes such paths, so the weight
-        is 1
+    seen : whether the ray comes from the camera directly. No other technique samples such paths, so the
+        weight is 1
     """
     value[0] = value[1] = value[2] = 0.0
     cosine = -(

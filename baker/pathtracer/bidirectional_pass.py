@@ -1,8 +1,10 @@
 """Passes of the bidirectional estimator: tiles of surface points, and pictures with their splats.
 
-A picture is divided into blocks, and a block into tiles. A splat may be in any pixel, so each tile returns a
-list of its splats. The lists are added in the order of tiles, so that sums do not depend on the number of
-threads. They are added after each block, which limits memory.
+A picture is divided into blocks, and a block into tiles. A splat (see `bidirectional`) may be in any pixel,
+so each
+tile returns a list of its splats. After each block, the lists are added to the picture, which limits memory.
+They are
+added in the order of tiles, so that sums do not depend on the number of threads.
 """
 
 from __future__ import annotations
@@ -37,10 +39,11 @@ def surface_tile(
     settings: PathSettings,
     out: NDArray[np.float64],
 ) -> tuple[int, int]:
-    """Add E / pi of each sample of m points to `out` (m, 3); return numbers of rays as `trace_paths`.
+    """Add E / pi of each sample of m points to `out` (m, 3).
 
     points : position, normal and face normal, each (m, k, 3), see `irradiance_pass`
-    begin : number of the first point, for its random numbers
+    begin : number of the first point, on which its random numbers depend
+    Returns the numbers of closest-hit rays and shadow rays.
     """
     rays, shadows, _ = trace_both_ways(
         *points, begin, np.zeros(CAMERA_COLUMNS), 0.0, reference.surfaces, reference.lights,
@@ -60,7 +63,7 @@ def picture_pass(
     settings: PathSettings,
     progress: Progress,
 ) -> None:
-    """Add one pass of radiance through every pixel to an estimate; see `radiance_pass`.
+    """Add one pass of the radiance of all pixels to an estimate; see `radiance_pass`.
 
     size : width and height of the picture, pixels; sobol_points, settings : see `trace_paths`
     """

@@ -1,19 +1,24 @@
 # mypy: disable-error-code="no-untyped-def"
-"""MIS weights of `bidirectional`: densities of all techniques relative to the one that sampled the path.
+"""MIS weights of `bidirectional`: densities of all techniques relative to the technique used.
 
-Let a path have vertices x_0 (on the light) to x_k-1 (at the eye). Technique s samples s of its vertices from
+Let a path have vertices x_0 (on the light) to x_k-1 (at the eye). Technique s samples s of the vertices from
 the light and k - s from the eye. Its density is p_s, and its weight by the balance heuristic is w_s:
 
     p_s+1 / p_s = pL(x_s) / pE(x_s)        w_s = 1 / (1 + sum over s' != s of p_s' / p_s)
 
 pL and pE are the densities, per area, of a vertex sampled from the light side and from the eye side. The sum
-is split at the connection: s' < s is stored with the light subpath, s' > s with the eye subpath. Both sums
-are updated while a subpath grows, so that the cost of a connection does not depend on the subpaths' lengths.
+is
+split at s: the part s' < s is stored with the light subpath, the part s' > s with the eye subpath. Each
+part is updated while its subpath grows, so that the cost of a connection does not depend on the subpaths'
+lengths.
 
-A light subpath stores one sum, because all techniques with fewer light vertices exist. An eye subpath stores
-one sum for each number of vertices that a light subpath may still add, because light subpaths are limited to
-`MAX_LIGHT_VERTICES` vertices. The density of a mirror reflection is set to 1, because it cancels in the
-ratio. Connections at mirrors have weight 0.
+A light subpath stores one sum, because all techniques with fewer light vertices exist. Techniques with more
+light
+vertices exist only up to `MAX_LIGHT_VERTICES`. Therefore an eye subpath stores one sum for each number of
+vertices
+that a light subpath may still add. The density of a mirror reflection is set to 1, because it cancels in the
+ratio.
+Connections at mirrors have weight 0.
 
 Based on: Veach, Robust Monte Carlo methods for light transport simulation, 1997, ch. 5.3 (shading normals), 8
 and 10; van Antwerpen, Unbiased physically based rendering on the GPU, 2011 (recursive sums); Georgiev,
@@ -31,7 +36,7 @@ from baker.trace.jit import inner
 
 # Largest number of vertices of a light subpath, including the vertex on the light.
 MAX_LIGHT_VERTICES = 8
-# Rows of `path` after those of `vertex`:
+# Rows of `path` after the rows that `pathtracer.vertex` defines:
 #
 #     BACK      unit direction to the previous vertex, world (3)
 #     INVERSE   1 / density, per area, with which this vertex was sampled
@@ -49,13 +54,14 @@ N_ROWS_BOTH = CHAIN + MAX_LIGHT_VERTICES
 
 @inner
 def meet(path, row, k, ex, ey, ez, lx, ly, lz, value):
-    """Evaluate the BSDF at the vertex in column k, for light from direction l reflected in direction e.
+    """Evaluate the BSDF at the vertex in column k, for light from direction l that is reflected to e.
 
     e and l are unit world directions away from the vertex, e towards the eye and l towards the light.
 
     path : (N_ROWS_BOTH, n) float64; row : (5, n) float64
     value : (3,) float64, output, f(e, l) |n.l| / |ng.l|, where n is the shading and ng the geometric normal.
-        Callers multiply `value` by geometric cosines only, so light and eye subpaths give the same result
+        Callers multiply `value` by geometric cosines only, so that light and eye subpaths give the same
+        result
 
     Returns
     -------
@@ -77,8 +83,8 @@ def meet(path, row, k, ex, ey, ez, lx, ly, lz, value):
             value[c] = row[BASE + c, k] * INV_PI * nl / gl
         return nl * INV_PI, max(ne, 0.0) * INV_PI
     el = ex * lx + ey * ly + ez * lz
-    # If the shading normal does not face the viewer, use the geometric normal, as `arrive` does. A light
-    # subpath arrives from l, so l is the view direction of its density.
+    # If the shading normal does not face the viewer, use the geometric normal, as `vertex.arrive` does. For
+    # the density of a light subpath, which arrives from l, the viewer is at l.
     if ne > GRAZE:
         from_eye = bsdf_cosines(row, k, ne, nl, el, value)
     else:
@@ -96,8 +102,8 @@ def leave_vertex(path, lane, density, reverse, smooth, depth):
 
     path : (N_ROWS_BOTH, n) float64
     density : density of `GO`, per steradian; 1 for a mirror reflection
-    reverse : density, per steradian, with which a subpath from the other end that arrives along -`GO` samples
-        `BACK`; 1 for a mirror reflection, 0 if no such subpath exists
+    reverse : density, per steradian, of `BACK` for a subpath from the other end, which arrives along -`GO`; 1
+        for a mirror reflection, 0 if no such subpath exists
     smooth : whether `GO` is a mirror reflection
     depth : number of sums: 1 for light subpaths, `MAX_LIGHT_VERTICES` for eye subpaths
     """
@@ -152,10 +158,11 @@ def reach_vertex(path, lane, distance, depth):
         carry(path, lane, path[LEAVE, lane] / square, depth)
         path[INVERSE, lane] = square / (path[DENSITY, lane] * cosine)
     else:
-        # Light from infinity: its density per area does not depend on the distance.
+        # The light comes from infinity, so the density per area does not depend on the distance.
         path[INVERSE, lane] = 1.0 / (path[DENSITY, lane] * cosine)
         if path[ORIGIN, lane] == 2.0:
-            # Ratio of two densities of the sky: cosine / pi of light samples, 0.25 / pi of light subpaths.
+            # Density of sky directions for light samples, cosine / pi, divided by their density for light
+            # subpaths, 0.25 / pi.
             path[OPEN, lane] = 4.0 * cosine
     return cosine
 
@@ -187,7 +194,7 @@ def towards_light(path, k, density, reverse):
 
 @inner
 def pixel_density(camera, direction):
-    """Return the density, per steradian, of the camera rays of one pixel in a direction; 0 behind the camera.
+    """Return the density, per steradian, of one pixel's camera rays in a direction; 0 behind the camera.
 
     camera : (15,) float64, see `camera`; direction : (3,) float64, unit, from the camera
     """

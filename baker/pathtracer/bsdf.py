@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""The BSDFs: Lambert, and glTF's metallic-roughness model, which becomes a mirror at low roughness.
+"""The BSDFs: Lambert, and glTF's metallic-roughness model, whose specular lobe may be a mirror.
 
     f = c_diff (1 - F) / pi + F D V        c_diff = base (1 - metallic), F0 = mix(0.04, base, metallic)
     D = a^2 / (pi ((n.h)^2 (a^2 - 1) + 1)^2)      a = roughness^2
@@ -22,9 +22,9 @@ import math
 from baker.trace.jit import inner
 
 INV_PI = 1.0 / math.pi
-# GGX width a, below which the specular lobe is a mirror.
+# GGX width a. Below it, the specular lobe is treated as a mirror.
 SMOOTH = 1.0e-3
-# F0 of a non-metal.
+# F0 (reflectance at normal incidence) of a non-metal.
 DIELECTRIC = 0.04
 # Rows of `row`, the parameters of a BSDF: base colour (3), metallic, GGX width a. A negative width means
 # Lambert.
@@ -63,7 +63,7 @@ def ggx_visibility(nl, nv, a):
 def specular_chance(row, lane, nv):
     """Return the probability with which `bsdf_sample` chooses the specular lobe, for n.v = nv.
 
-    row : (5, n) float64; column `lane` is the parameters of the BSDF
+    row : (5, n) float64; column `lane` contains the parameters of the BSDF
     """
     if row[WIDTH, lane] < 0.0:
         return 0.0
@@ -82,7 +82,7 @@ def bsdf_eval(row, lane, vx, vy, vz, lx, ly, lz, out):
 
     The density is per steradian.
 
-    row : (5, n) float64; column `lane` is the parameters of the BSDF
+    row : (5, n) float64; column `lane` contains the parameters of the BSDF
     v, l : unit directions away from the surface, in the frame of the shading normal
     """
     return bsdf_cosines(row, lane, vz, lz, vx * lx + vy * ly + vz * lz, out)

@@ -1,4 +1,4 @@
-"""A pinhole camera: rays through its pixels, and the parser of its description on the command line."""
+"""A pinhole camera: rays through its pixels, and the parser of its text form."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def camera_columns(
 def camera_rays(
     camera: Camera, width: int, height: int, pixel: NDArray[np.int64], samples: int, seed: int, number: int
 ) -> NDArray[np.float64]:
-    """Return unit directions through n pixels, evenly distributed over the square of each pixel.
+    """Return unit directions of camera rays, evenly distributed over the square of each of n pixels.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def _fill(lens, width, height, pixel, first, second, direction):  # type: ignore
 
 
 def _salt(seed: int, number: int) -> np.uint64:
-    """Return a hash of (seed, number); the random numbers of `_uniform` depend on it."""
+    """Return a hash of (seed, number), which is an argument of `_uniform`."""
     word = (seed * 0x9E3779B1 + number * 0x85EBCA77 + 1) & 0xFFFFFFFF
     # Hash an array, because NumPy scalars warn of overflow.
     return np.uint64(int(hash_u32(np.array([word], np.uint32))[0]) << 17)

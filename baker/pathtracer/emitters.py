@@ -1,9 +1,12 @@
 """The emissive triangles of a scene, for the path tracer.
 
-This module does not use `lights.emissive.build_emitters`, so that an emitter which the bake misses is still
-in the reference. It computes from the resolved materials which triangles emit, and their area, radiance,
-sides and power. Triangles with an emissive texture are divided by `lights.emissive_texture.cut`. The parts
-change sampling densities only: the radiance of a point is looked up in the material.
+This module does not use `lights.emissive.build_emitters`. So an emitter that the bake misses by a mistake
+there is
+still in the reference. From the resolved materials, this module computes which triangles emit, and their
+area,
+radiance, sides and power. `lights.emissive_texture.cut` divides triangles with an emissive texture into
+parts. The
+parts affect sampling densities only, because the radiance of a point is looked up in the material.
 
     power = pi area L, twice that if two-sided
 
@@ -31,19 +34,21 @@ from baker.lights.emissive_texture import EmissiveTextures, Parts, brightness, c
 #     EMITTER_CHANCE      probability with which it is chosen
 #     EMITTER_RADIANCE    radiance without texture, cd/m2 (3)
 #     EMITTER_TEXTURED    1 if it has a texture, else 0
-#     EMITTER_PART        position in the scene's triangle: barycentrics b1, b2 of its corner 0; edge length
-#                         as a share of the triangle's, negative if rotated by 180 degrees. It is (0, 0, 1)
-#                         for a whole triangle
+#  EMITTER_PART         position in the scene's triangle (3): barycentrics b1, b2 of the emitter's corner 0;
+#                       edge length divided by the triangle's edge length, negative if the part is rotated
+#                       by 180 degrees. (0, 0, 1) for a whole triangle
 EMITTER_CORNER, EMITTER_NORMAL, EMITTER_AREA, EMITTER_TWO_SIDED, EMITTER_CHANCE = 0, 9, 12, 13, 14
 EMITTER_RADIANCE, EMITTER_TEXTURED, EMITTER_PART = 15, 18, 19
 EMITTER_COLUMNS = 24
-# Number of parts that cutting textured triangles may add: four times as many as in bakes, which use the mean
-# radiance of each part.
+# Largest number of parts of all textured triangles, minus the number of textured triangles. Four times the
+# number of
+# bakes.
 MAX_PARTS = 131072
-# Share of the scene's diagonal: parts that are smaller and at most one texture texel wide are not cut
-# further.
+# Longest edge of a part, as a share of the scene's diagonal. Parts up to this size that are at most one texel
+# of the
+# texture wide are not cut further.
 _SMALL = 1.0 / 128.0
-# Number of cells, less one, along the longest axis of the grid of `_spatial_order`.
+# Number of cells minus one, along the longest axis of the grid of `_spatial_order`.
 _CELLS = 1023.0
 _LUMINANCE = np.array(LUMINANCE_WEIGHTS)
 
@@ -56,7 +61,7 @@ class FoundEmitters(NamedTuple):
     row : (E, 24) float64
         Columns: `EMITTER_CORNER` to `EMITTER_PART`. EMITTER_CHANCE is still 0.
     triangle : (E,) int32
-        For each emitter, the triangle of the scene that it is, or is a part of.
+        Triangle of the scene that contains each emitter.
     power : (E,) float64
         Power of each emitter, lm.
     code : (T,) int32
@@ -74,7 +79,7 @@ class FoundEmitters(NamedTuple):
 
 
 def find_emitters(geometry: Geometry, shading: Shading, max_parts: int = MAX_PARTS) -> FoundEmitters:
-    """Find the triangles that emit, and divide textured ones into parts.
+    """Find the triangles that emit, and divide textured triangles into parts.
 
     Parameters
     ----------
@@ -83,7 +88,7 @@ def find_emitters(geometry: Geometry, shading: Shading, max_parts: int = MAX_PAR
     shading : Shading
         The materials of the triangles.
     max_parts : int
-        Number of parts that cutting textured triangles may add.
+        Largest number of parts of all textured triangles, minus the number of textured triangles.
 
     Returns
     -------

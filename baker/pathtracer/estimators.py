@@ -1,9 +1,10 @@
-"""Estimators of the rendering equation, by name, and the options of paths that each sets.
+"""Estimators of the rendering equation by name, with their ways to sample directions and lights.
 
 With `uniform`, `cosine`, `stratified` and `bsdf`, paths hit emitters and the sky at random. `light` samples
 a light at every vertex. `mis` and `mis-power` combine both techniques by multiple importance sampling. `bdpt`
-connects paths from the eye with paths from lights. Paths cannot hit lights without area, so every estimator
-samples these lights or starts paths at them.
+connects paths from the eye with paths from lights (`bidirectional`). Paths cannot hit lights without area, so
+every
+estimator samples these lights or starts paths at them.
 
 Based on: Kajiya, The rendering equation, 1986; Veach, Robust Monte Carlo methods for light transport
 simulation, 1997, ch. 8 and 9.
@@ -26,11 +27,13 @@ class Estimator(NamedTuple):
         Distribution of directions. 0: proportional to the BSDF; 1: uniform over the hemisphere; 2:
         cosine-weighted.
     aim : int
-        Sampling of emitters and the sky. 0: never. 1: at every vertex; light that paths hit is then added
-        only if the camera sees it directly or in mirrors. 2: at every vertex, combined with hits by MIS.
+        Sampling of emitters and the sky. 0: never. 1: at every vertex; emission that a path hits is then
+        added only if the camera sees it directly or in mirrors. 2: at every vertex, combined by MIS with
+        emission that a path hits.
     strata : int
-        1 if the light pair and the direction pair of each path's first vertex are stratified: over the
-        samples of a pass, each pair is a scrambled (0,2)-sequence.
+        1 if the samples at each path's first vertex are stratified. Two pairs of random numbers choose the
+        point on the light and the direction; over the samples of a pass, each pair is a scrambled
+        (0,2)-sequence.
     power : int
         1 for the power heuristic of MIS (exponent 2), 0 for the balance heuristic.
     both : int
@@ -47,15 +50,14 @@ class Estimator(NamedTuple):
 
 @dataclass(frozen=True)
 class PassOptions:
-    """How a pass samples paths.
+    """How a pass samples paths; `irradiance` defines a pass.
 
     Attributes
     ----------
     estimator : str
         A key of `ESTIMATORS`.
     stratify : bool
-        Whether paths from surface points are stratified (`Estimator.strata`) even if the estimator does not
-        ask for it.
+        If true, paths from surface points are stratified (`Estimator.strata`) with every estimator.
     max_bounces : int or None
         Largest number of reflections between the light and the surface point, or between the light and the
         first surface that a camera sees. None: no limit.

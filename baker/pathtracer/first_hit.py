@@ -50,15 +50,17 @@ class FirstHits:
     albedo : (n, 3) float64
         Base colour with texture and vertex colour, linear Rec.709; 0 without a hit.
     position : (n, 3) float64
-        Position of the hit, metres, relative to the geometry's origin; undefined without a hit.
+        Position of the hit, metres, relative to `reference.geometry.origin`; undefined without a hit.
     normal, face_normal : (n, 3) float64
         Unit shading normal and geometric normal, on the viewer's side; 0 without a hit.
     front : (n,) bool
         Whether the front of the triangle was hit.
     lit : (n,) bool
-        Whether the side that was hit reflects light: a front, or either side of a two-sided surface.
+        Whether the side that was hit reflects light. Fronts do, and both sides of two-sided surfaces.
     kept : (n, 3) float64
-        Transmittance of the `BLEND` surfaces along the ray.
+        Product of lerp(1, c, a) over the `BLEND` surfaces that the ray passed, with colour c and alpha a. The
+        factor 1 - a of their transmittance is the probability of passing: the ray stops at a `BLEND` surface
+        with probability a.
     """
 
     triangle: NDArray[np.int32]
@@ -83,7 +85,7 @@ def first_hits(
     reference : Reference
         The scene.
     origin : (3,) or (n, 3) float64
-        One origin for all rays, or one for each ray; metres, relative to the geometry's origin.
+        One origin for all rays, or one for each ray; metres, relative to `reference.geometry.origin`.
     direction : (n, 3) float64
         Unit directions, world.
 

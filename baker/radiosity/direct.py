@@ -1,10 +1,10 @@
 """Direct light of every texel: emissive triangles, then lights without area.
 
-There are two estimates of the direct irradiance:
+Two estimates of the direct irradiance are computed:
 
-- `weighted` is the part that MIS assigns to shadow rays. The final gather adds the other part, from its rays
-  that hit emitters. The lightmap contains both parts.
-- `complete` is all direct light. It is the light that surfaces reflect in the first bounce.
+- `weighted` is the part that MIS (multiple importance sampling) assigns to shadow rays. The final gather adds
+  the rest, from its rays that hit emitters. The lightmap contains both.
+- `complete` is all direct light. Surfaces reflect it in the first bounce.
 """
 
 from __future__ import annotations
@@ -34,11 +34,12 @@ from baker.trace.packets import PacketBuffers
 # Texel entries (rows of `TexelBuffer`) per tile. The final gather uses the same tiles, so that both stages
 # sample the same emitters.
 TILE = 512
-# Columns of `_Tile.light`: RGB of both estimates.
+# Columns of `_Tile.light`: RGB of the estimates `weighted` and `complete`.
 WEIGHTED, COMPLETE = slice(0, 3), slice(3, 6)
-# Number of hemisphere rays per texel that `complete` combines with shadow rays close to emitters.
+# Number of hemisphere rays per texel that `complete` combines with shadow rays, at texels close to emitters.
 N_HEMISPHERE = 4
-# Radius / distance of a visible emitter cluster above which texels are close to it.
+# Radius / distance of a visible emitter cluster. Above it, texels are close to the cluster and cast
+# `N_HEMISPHERE` rays.
 CLOSE = 0.5
 
 
@@ -49,16 +50,15 @@ class DirectLight:
     Attributes
     ----------
     weighted : (n, 3) float32, lx
-        RGB, without the part that gather rays add when they hit emitters.
+        RGB, without the light that gather rays add when they hit emitters.
     complete : (n, 3) float32, lx
         RGB of all direct light.
     variance : (n,) float32, lx2
         Variance of (R + G + B) / 3 of `weighted`.
     analytic : (n,) uint8
-        1 where `weighted` already contains all light of the visible emitters.
+        1 where `weighted` contains all light of the visible emitters, in closed form.
     rays : int
-        Number of rays cast for emitters, plus 16 for each entry and each light without area. The second
-        number is an upper bound.
+        Number of rays: those cast for emitters, plus 16 per entry and light without area, an upper bound.
     """
 
     weighted: NDArray[np.float32]
@@ -78,7 +78,7 @@ def direct_light(job: TraceJob, lights: tuple[PunctualLight, ...], sampling: Emi
     lights : tuple of PunctualLight
         Lights without area.
     sampling : EmitterSampling
-        Emitters, and the numbers of shadow rays and hemisphere rays that the MIS weights contain.
+        Emitters, and the numbers of shadow rays and hemisphere rays for the MIS weights.
 
     Returns
     -------
@@ -115,10 +115,10 @@ def direct_light(job: TraceJob, lights: tuple[PunctualLight, ...], sampling: Emi
 
 
 class _Tile(NamedTuple):
-    """Results of m consecutive entries: a tile or a part of a tile.
+    """Light of m consecutive entries: a tile or a part of a tile.
 
     light : (m, 6) float32, lx, columns `WEIGHTED` and `COMPLETE`
-    variance : (m,) float32, lx2, and analytic : (m,) uint8, see `DirectLight`
+    variance (m,) float32, lx2; analytic (m,) uint8 : see `DirectLight`
     """
 
     light: NDArray[np.float32]
@@ -142,12 +142,12 @@ class _EmitterLight:
     Attributes
     ----------
     lookup : TriangleLookup, finds the emitter of a hit
-    chooser : EmitterChooser, chooses the clusters to which shadow rays are cast
-    shading : Shading or None, from `emitters.needed_shading`
+    chooser : EmitterChooser, chooses the clusters of emitters to which shadow rays are cast
+    shading : Shading or None, from `kernels.emitters.needed_shading`
     sobol_points : (n_light, 2) uint32
         Sobol points of shadow rays to visible clusters.
     hidden_points : (n_hidden, 2) uint32
-        Sobol points of shadow rays to hidden clusters, see `emitter_choice`.
+        Sobol points of shadow rays to hidden clusters, see `radiosity.emitter_choice`.
     near_points : (N_HEMISPHERE, 2) uint32
         Sobol points of hemisphere rays close to emitters.
     n_gather, n_light : int, see `EmitterSampling`
@@ -209,8 +209,8 @@ class _EmitterLight:
     ) -> int:
         """Add the light that shadow rays find to `out`; return the number of these rays."""
         n_cast = 0
-        # Set the numbers of hemisphere rays in the MIS weights. `weighted` is combined with the rays of the
-        # final gather, `complete` with the rays of `_gather`.
+        # Numbers of hemisphere rays for the MIS weights: `weighted` is combined with the rays of the final
+        # gather, `complete` with the rays of `_gather`.
         hemisphere = np.array([self.n_gather, N_HEMISPHERE * (choice.view > CLOSE)], np.float64)
         for emitters, sobol_points in ((choice.seen, self.sobol_points), (choice.hidden, self.hidden_points)):
             if emitters is None or not emitters.chance.any():
@@ -248,9 +248,9 @@ class _EmitterLight:
 
 
 def batch_variance(total: NDArray[np.float32], squares: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return (m,) float32: the variance of (R + G + B) / 3 of m texels, estimated from 16 batches of samples.
+    """Return (m,) float32: the variance of (R + G + B) / 3 of m texels, from 16 batches of samples each.
 
-    Each of R, G and B is the sum of the batches' contributions.
+    A texel's R is the sum of the contributions of its batches; so are G and B.
 
     Parameters
     ----------

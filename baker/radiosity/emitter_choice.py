@@ -1,15 +1,17 @@
 """Chooses the emitter clusters that the texels of a tile sample, and the numbers of samples.
 
-`emitters.cluster_chances` estimates the unoccluded irradiance that each cluster of emitters causes. With
-these estimates alone, a very bright emitter behind a wall would get nearly all samples. Therefore a few probe
-rays from the tile to each cluster estimate the cluster's visibility.
+`kernels.emitters.cluster_chances` estimates the unoccluded irradiance that each cluster of emitters
+causes. With these estimates alone, a very bright emitter behind a wall would get nearly all samples.
+Therefore a few
+shadow
+rays, the probe rays, are cast from the tile to each cluster to find whether it is visible.
 
 - The samples are distributed over the visible clusters.
-- Clusters that no probe ray reached are hidden. They are a separate stratum with few samples. MIS combines
-  these samples with gather rays that hit hidden clusters, so a cluster that is visible through a small
+- Clusters that no probe ray reaches are called hidden. They form a separate stratum with few samples, which
+  MIS combines with gather rays that hit these clusters. So a cluster that is visible only through a small
   opening still contributes.
-- If a bright cluster is visible from only a part of the tile, clusters are chosen for each block of up to
-  sixteen consecutive texels.
+- If a cluster that outshines others is visible from only a part of the tile, visible and hidden clusters are
+  found for each block of up to sixteen consecutive texels.
 
 Based on: Ward, Adaptive shadow testing for ray tracing, 1991; Georgiev et al., Importance caching for complex
 illumination, 2012.
@@ -39,24 +41,26 @@ from baker.kernels.shading import Shading
 from baker.radiosity.kernels.emitter_probe import probe_clusters
 from baker.trace.packets import PACKET_WIDTH, PacketBuffers
 
-# Largest and smallest number of probe rays from a tile to each cluster.
+# Largest and smallest number of probe rays from a tile to each cluster. From a block, they are at most 16.
 _MOST_RAYS, _FEWEST_RAYS = 32, 4
-# Number of all probe rays of a tile, as a share of the tile's shadow rays.
+# Number of probe rays of a tile to all clusters, as a share of the tile's shadow rays.
 _COST = 0.06
-# Number of clusters up to which all hidden clusters are in the separate stratum.
+# Number of clusters in the scene. Up to it, all hidden clusters are in the separate stratum.
 _FEW = 32
-# Largest total weight (power / distance^2) of hidden clusters that are sampled together with the visible
-# clusters, as a share of the visible clusters' total weight. With more than _FEW clusters, the dimmest hidden
-# clusters are treated in this way.
+# Total weight (power / distance^2) of hidden clusters, as a share of the visible clusters' total weight. If
+# there
+# are more than _FEW clusters, the dimmest hidden clusters up to this total are sampled with the visible ones.
 _HARMLESS = 0.25
-# Ratio of the weights of two visible clusters above which clusters are chosen for each block. The condition
-# is that the cluster of larger weight is visible from only a part of the tile.
+# Ratio of the weights of two visible clusters. Above it, clusters are chosen for each block if the cluster of
+# larger
+# weight is visible from only a part of the tile.
 _OUTSHINES = 4.0
-# Cosine between the normals of consecutive texels below which a new block begins.
+# Cosine between the normals of consecutive texels. Below it, a new block begins.
 _TURN = 0.5
-# Ratio of power per area up to which touching emitters are treated as one light, without a choice.
+# Ratio between the largest and the smallest power per area of all clusters. Up to it, clusters that form one
+# connected group are treated as one light, and no probe rays are cast.
 _ALIKE = 4.0
-# Shadow rays to hidden clusters, as a share of the shadow rays to visible clusters.
+# Number of shadow rays to hidden clusters, as a share of the number of shadow rays to visible clusters.
 _HIDDEN_SHARE = 1.0 / 8.0
 
 
@@ -67,7 +71,7 @@ class EmitterSampling:
     Attributes
     ----------
     emitters : Emitters
-        Emissive triangles in clusters.
+        Emissive triangles, grouped into clusters.
     shading : Shading
         Materials of all triangles: textured emission, alpha.
     n_light : int
@@ -82,23 +86,23 @@ class EmitterSampling:
     n_gather: int
 
     def needed_shading(self) -> Shading | None:
-        """Return the shading that kernels need; see `emitters.needed_shading`."""
+        """Return the materials, or None if kernels need none; see `kernels.emitters.needed_shading`."""
         return needed_shading(self.emitters, self.shading)
 
     def chooser(self, chart: NDArray[np.int32] | None) -> EmitterChooser:
-        """Return the chooser of emitters for tiles; `chart` (n,) int32 is the chart of each texel entry."""
+        """Return a chooser for these emitters; `chart` (n,) int32 is the chart of each texel entry."""
         return EmitterChooser.build(self.emitters, self.n_light, chart)
 
 
 class Choice(NamedTuple):
-    """Emitter clusters that consecutive texels of a tile sample.
+    """Emitter clusters to which the texels of a part of a tile cast shadow rays.
 
-    part : slice, the texels within the tile
+    part : slice, the part: consecutive texels, as indices within the tile
     seen : visible clusters, to which `n_light` shadow rays are cast
     hidden : clusters that no probe ray reached, to which `n_hidden` shadow rays are cast; None without such
         clusters
-    found : all clusters with the sampling densities of both strata, for MIS weights of gather rays
-    view : largest radius / distance of a cluster in `seen`, see `emitters.widest_view`
+    found : all clusters, with the sampling densities that the MIS weights of gather rays need
+    view : largest radius / distance of a cluster in `seen`, see `kernels.emitters.widest_view`
     """
 
     part: slice
@@ -110,7 +114,7 @@ class Choice(NamedTuple):
 
 @dataclass(frozen=True)
 class EmitterChooser:
-    """Chooses emitters for tiles. Stages that pass the same points get the same choices.
+    """Chooses emitters for tiles. If two stages pass the same points, they get the same choices.
 
     Attributes
     ----------
@@ -119,7 +123,7 @@ class EmitterChooser:
     n_light, n_hidden : int
         Shadow rays of a texel to visible clusters, and to hidden clusters.
     single : bool
-        True if all emitters are treated as one light: every tile samples all of them.
+        True if all emitters are treated as one light, so that every tile samples all of them.
     chart : (n,) int32 or None
         Chart of each texel entry.
     """
@@ -144,12 +148,12 @@ class EmitterChooser:
     def choose(
         self, begin: int, origin: NDArray[np.float32], normal: NDArray[np.float32], buffers: PacketBuffers
     ) -> list[Choice]:
-        """Split a tile into parts, and return the emitters that each part samples, in order.
+        """Split a tile into parts; return the emitters that each part samples, in the order of the parts.
 
         Parameters
         ----------
         begin : int, the tile's first texel entry
-        origin, normal : (m, 16, 3) float32, metres, world, and unit; the 16 points of each texel
+        origin, normal : (m, 16, 3) float32, metres and unit vectors, world; the 16 points of each texel
         """
         whole = slice(0, len(origin))
         all_emitters = tile_emitters(self.emitters, origin)
@@ -200,8 +204,8 @@ class EmitterChooser:
     ) -> tuple[NDArray[np.int64], bool]:
         """Split a tile into blocks of up to sixteen consecutive texels of one chart with similar normals.
 
-        Returns (B + 1,) int64, where block b contains the texels `bounds[b] : bounds[b + 1]` of the tile, and
-        whether the chart or the normal changes within the tile.
+        Returns `bounds` (B + 1,) int64 and a bool. Block b contains the texels `bounds[b] : bounds[b + 1]` of
+        the tile. The bool is True if the chart or the normal changes within the tile.
         """
         facing = normal[:, 0]
         apart = (facing[1:] * facing[:-1]).sum(axis=1) < _TURN
@@ -220,7 +224,7 @@ class EmitterChooser:
         bounds: NDArray[np.int64],
         chosen: NDArray[np.bool_],
     ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Return (B, C) int32: the probe rays from each block to each cluster, and the unblocked probe rays.
+        """Return two (B, C) int32: the numbers of probe rays and of unblocked ones, by block and cluster.
 
         bounds : (B + 1,) int64, see `_blocks`; chosen : (C,) bool, clusters to probe
         """
@@ -233,9 +237,10 @@ class EmitterChooser:
         return asked, seen
 
     def _weights(self, all_emitters: TileEmitters, origin: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Return (C,) float64: power / distance^2 of each cluster; 0 if it faces away from all points.
+        """Return (C,) float64: power / distance^2 of each cluster; 0 if the cluster faces away from all
+        points.
 
-        origin : (m, w, 3) float32, metres, world; the distance is from the centre of their bounding box
+        origin : (m, w, 3) float32, metres, world; distances are from the centre of the points' bounding box
         """
         points = origin.reshape(-1, 3)
         low, high = points.min(axis=0).astype(np.float64), points.max(axis=0).astype(np.float64)
@@ -245,7 +250,7 @@ class EmitterChooser:
         return np.where(all_emitters.chance > 0, weight, 0.0)
 
     def _hidden(self, weight: NDArray[np.float64], seen: NDArray[np.int32]) -> NDArray[np.bool_]:
-        """Return (C,) bool: the clusters of the separate stratum; all False if no cluster is visible.
+        """Return (C,) bool: the hidden clusters of the separate stratum; all False if no cluster is visible.
 
         weight : (C,) float64, from `_weights`; seen : (C,) int32, unblocked probe rays to each cluster
         """
@@ -269,8 +274,8 @@ class EmitterChooser:
         if not hidden.any() or not (all_emitters.chance[~hidden] > 0).any():
             return Choice(part, all_emitters, None, all_emitters, widest_view(self.emitters, origin))
         visible, others = only(self.emitters, ~hidden), only(self.emitters, hidden)
-        # Do not use the closed form for hidden emitters. It requires that no shadow ray is blocked, and
-        # too few rays test this.
+        # Do not use the closed form for hidden emitters. It requires that no shadow ray is blocked, and too
+        # few shadow rays are cast to test that.
         others.row[others.row[:, TEXTURED] == 0.0, TEXTURED] = NO_CLOSED_FORM
         seen, apart = tile_emitters(visible, origin), tile_emitters(others, origin)
         chance = np.zeros_like(all_emitters.chance)
@@ -302,7 +307,7 @@ def only(emitters: Emitters, which: NDArray[np.bool_]) -> Emitters:
 
 
 def _one_light(emitters: Emitters) -> bool:
-    """Return whether all clusters form one connected group of similar radiosity.
+    """Return whether all clusters form one connected group of similar power per area.
 
     Two clusters are connected if their bounding spheres overlap. Walls rarely separate such clusters.
     """

@@ -1,6 +1,8 @@
-"""The final gather: irradiance and ambient occlusion of front texels from hemisphere rays.
+"""The final gather: irradiance and ambient occlusion of the texels in the page, from hemisphere rays.
 
-Each ray reads the light that the hit texel reflects. Ambient occlusion uses the same rays.
+Each ray reads the light that the texel at its hit reflects. Ambient occlusion uses the same rays. Front
+texels are
+the entries stored in the page; the backs of double-sided surfaces are not gathered.
 """
 
 from __future__ import annotations
@@ -36,9 +38,9 @@ class Gathered:
     Attributes
     ----------
     indirect : (n_front, 3) float32, lx
-        RGB of the light that surfaces reflect.
+        RGB of the irradiance from light that surfaces reflect.
     direct : (n_front, 3) float32, lx
-        RGB of the sky's light, and of the emitters' light times the MIS weight of gather rays.
+        RGB of the irradiance from the sky, and from emitters times the MIS weight of gather rays.
     open : (n_front,) float32
         Ambient occlusion within `ao_distance`; 1 is unoccluded.
     variance : (n_front,) float32, lx2
@@ -80,9 +82,9 @@ def final_gather(
     n_front : int
         Number of front texels, which are the first entries of the job.
     seen : SeenLight
-        Light that texels reflect (`Sides.seen_light`).
+        Light that texels reflect, from `Sides.seen_light`.
     analytic : (n,) uint8
-        `DirectLight.analytic`: 1 for entries to which hits of visible emitters add nothing.
+        `DirectLight.analytic`: 1 for entries to which rays that hit visible emitters add nothing.
     sampling : EmitterSampling
         Emitters that rays may hit, and the numbers of rays for their MIS weights.
     sky : tuple of float
@@ -102,8 +104,8 @@ def final_gather(
     shading, chooser = sampling.needed_shading(), sampling.chooser(job.chart)
 
     def work(begin: int, end: int) -> Part:
-        # Choose emitters for all entries of the tile, as in `direct_light`. The last tile with fronts may
-        # also contain backs.
+        # Choose emitters for the same entries as `direct_light`: the last tile with fronts may also contain
+        # backs.
         whole = min(begin + TILE, job.n)
         origin, normal = job.tile_points(begin, whole)
         buffers, out = job.packet_buffers(), np.zeros((end - begin, N_COLUMNS), np.float32)
@@ -125,7 +127,7 @@ def final_gather(
 
 
 def _fronts(choices: list[Choice], m: int) -> Iterator[tuple[Choice, slice]]:
-    """Yield each choice of a tile that contains some of the first m entries, with the slice of these."""
+    """Yield the choices for the first m entries of a tile, each with the slice of its entries among them."""
     for choice in choices:
         if choice.part.start < m:
             yield choice, slice(choice.part.start, min(choice.part.stop, m))

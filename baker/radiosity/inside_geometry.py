@@ -1,13 +1,16 @@
 """Finds the points of texels that lie inside geometry.
 
 Each texel has 16 points. A point is inside geometry if it lies in a solid (`topology.solids`), or if all its
-rays hit black backs of one-sided surfaces.
+rays hit black backs, the backs of one-sided surfaces.
 
 A ray from inside a solid first hits the solid's back or an object in the solid. A ray from outside never hits
-a back of a closed surface first. Therefore two rays that hit backs of solids prove that a point is inside.
+a back of a closed surface first, except by passing through an edge. Therefore two rays that first hit backs
+of
+solids prove that a point is inside.
 
-A first pass casts a few rays from every texel to find candidates. A second pass tests all points of the
-candidates and of their neighbours separately. So a texel half under a box keeps the valid points of its other
+A first pass casts a few rays from every texel to find candidates. A second pass tests each point of the
+candidates and of their neighbours. So a texel that lies half under a box keeps the valid points of its
+uncovered
 half.
 """
 
@@ -28,7 +31,7 @@ from baker.radiosity.trace_job import TraceJob
 
 # Texels per tile.
 _TILE = 2048
-# First pass: step between the tested points of the 16 points of a texel, with one ray from each tested point.
+# First pass: every 4th of a texel's 16 points is tested, with one ray.
 _STRIDE = 4
 # Second pass: rays from each of the 16 points.
 _RAYS_PER_POINT = 8
@@ -37,7 +40,7 @@ _RAYS_PER_POINT = 8
 def find_inside_geometry(
     texels: TexelBuffer, job: TraceJob, hit_kind: NDArray[np.uint8]
 ) -> tuple[NDArray[np.uint16], int]:
-    """Find the valid points of texels: the points that do not lie inside geometry.
+    """Find the valid points of texels, which are the points that do not lie inside geometry.
 
     Parameters
     ----------
@@ -46,7 +49,7 @@ def find_inside_geometry(
     job : TraceJob
         Ray origins and scene. Its `valid_points` are not read, because all points are tested.
     hit_kind : (T,) uint8
-        For each triangle, what a first hit on it says about the origin, see `kernels.probe`.
+        For each triangle, what a first hit on it implies about the ray's origin, see `kernels.probe`.
 
     Returns
     -------
@@ -75,7 +78,7 @@ class _Pass(NamedTuple):
     """Parameters of the first or second pass.
 
     rays_per_point : int, rays from each tested point
-    stride : int, step between tested points of the 16 points
+    stride : int, the points 0, `stride`, 2 `stride`, ... of the 16 points are tested
     pair : int, pair of dimensions of the Sobol sequence
     proof : int, number of hits on backs of solids that prove a point to be inside
     """
@@ -89,7 +92,7 @@ class _Pass(NamedTuple):
 def _test_points(
     job: TraceJob, hit_kind: NDArray[np.uint8], chosen: NDArray[np.int64], test: _Pass
 ) -> tuple[NDArray[np.bool_], int]:
-    """Return (m, w) bool, whether the w tested points of each chosen entry lie inside, and the rays cast.
+    """Return (m, w) bool, True for tested points that lie inside geometry, and the number of rays cast.
 
     hit_kind : (T,) uint8, see `find_inside_geometry`; chosen : (m,) int64, texel entries
     """
@@ -113,9 +116,9 @@ def _test_points(
 
 
 def _with_neighbours(texels: TexelBuffer, suspect: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return (n,) bool: the candidates and their eight neighbours in the page, fronts and backs separately.
+    """Return (n,) bool: the candidates and their eight neighbours in the page.
 
-    suspect : (n,) bool, the candidates
+    suspect : (n,) bool, the candidates; a back is a neighbour of backs only
     """
     out = suspect.copy()
     for back in (False, True):

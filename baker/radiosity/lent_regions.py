@@ -1,12 +1,16 @@
 """Assigns regions to invalid texels, which are later filled from neighbours of the same region.
 
-Regions are the parts of a chart that other surfaces separate (`radiosity.sides`). For example, a ceiling
-continues over a wall between a dark room and a bright outside, and its texels above the wall are invalid.
-Engines interpolate between texel centres, so bilinear lookups in the room read these texels. Filled with
-light from outside, they would appear as a bright line along the ceiling.
+Invalid texels are texels whose points are all inside geometry. Regions are the parts of a chart that other
+surfaces
+separate (`radiosity.sides`). For example, a ceiling continues over a wall between a dark room and the bright
+outside. The ceiling's texels above the wall are invalid. Engines interpolate between texel centres, so a
+lookup on the ceiling of the room near the wall reads these texels. If they were filled with light from
+outside, the
+ceiling would show a bright line.
 
-A bilinear lookup at a point of a neighbouring texel reads the invalid texel with a certain weight. These
-weights are summed over the valid points of the neighbouring texels of each region. The invalid texel gets the
+A bilinear lookup at a point of a neighbouring texel reads the invalid texel with a certain weight. For each
+region, these weights are summed over all valid points of the neighbours in the region. The invalid texel gets
+the
 region with the largest sum. If all sums are 0, the texel gets the region of the nearest texel of its chart.
 """
 
@@ -31,7 +35,7 @@ def lend_regions(
     Parameters
     ----------
     texels : TexelBuffer
-        All entries; only the front texels are read.
+        All entries; only the front texels, which are stored in the page, are read.
     surface : Surface
         The same entries as arrays for kernels.
     region : (n_front,) int32
@@ -58,7 +62,7 @@ def lend_regions(
 
 
 def _ring_of(invalid: NDArray[np.int64], turn: tuple[int, int], size: int) -> tuple[NDArray[np.int64], ...]:
-    """Return the rows (b,) and columns (b,) of one neighbour of each texel, clipped to the page.
+    """Return the rows (b,) and columns (b,) of one neighbour of each invalid texel, clipped to the page.
 
     invalid : (b, 2) int64, row and column of texels; turn : row and column offset of the neighbour
     """
@@ -109,7 +113,7 @@ def _lookups(
     image: NDArray[np.int32],
     visible: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]],
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return pairs of an invalid texel and a region, and the summed bilinear weight of each pair.
+    """Return pairs of an invalid texel and the region of a neighbour, and the summed weight of each pair.
 
     invalid : (b, 2) int64, row and column; chart, image : (H, W) int32, chart and region of each pixel
     visible : from `_visible_points`

@@ -1,8 +1,10 @@
 """Finds texels in narrow gaps: under a rug, between books, between a cupboard and the wall.
 
-Inside a gap, light falls off over a distance of about the gap's width. A patch has a single radiosity. If a
-patch extended from the lit floor to below a rug, the floor under the rug would have the radiosity of the lit
-floor. Therefore texels inside gaps and texels outside gaps belong to different patches.
+Inside a gap, light decreases with the depth, over about one width of the gap. A patch has a single radiosity.
+If a
+patch contained the lit floor beside a rug and the floor under it, both would get the same radiosity.
+Therefore
+texels inside gaps and texels outside gaps belong to different patches.
 """
 
 from __future__ import annotations
@@ -18,17 +20,18 @@ from baker.radiosity.kernels.gather import estimate_occlusion
 from baker.radiosity.trace_job import TraceJob
 
 # _RAYS: number of rays per texel.
-# _EARLY_OUT: number of rays per texel after which sixteen consecutive texels are classified as outside gaps,
-# if at most one ray of each texel is blocked.
+# _EARLY_OUT: number of rays per texel. If at most one of the first _EARLY_OUT rays of each of sixteen
+# consecutive
+# texels is blocked, these texels are outside gaps.
 _RAYS, _EARLY_OUT = 16, 4
-# _OPEN: share of unblocked rays below which a texel lies in a gap.
+# _OPEN: share of unblocked rays of a texel. Below it, the texel lies in a gap.
 # _NEAR: length of the rays, in texel sides, that find gaps about as wide as a texel.
 # _FAR: length of the rays, in texel sides, that find gaps about as wide as a patch.
 _OPEN, _NEAR, _FAR = 0.25, 2.0, 8.0
 
 
 def gap_level(texels: TexelBuffer, job: TraceJob) -> tuple[NDArray[np.uint8], int]:
-    """Find texels in gaps with short rays.
+    """Find the texels in narrow gaps by casting short rays.
 
     Parameters
     ----------
@@ -40,7 +43,8 @@ def gap_level(texels: TexelBuffer, job: TraceJob) -> tuple[NDArray[np.uint8], in
     Returns
     -------
     level : (n,) uint8
-        Of each entry: 0 outside gaps, 1 in a gap several texels wide, 2 in a gap about a texel wide.
+        Gap level of each entry: 0 outside gaps, 1 in a gap several texels wide, 2 in a gap about a texel
+        wide.
     rays : int
         Number of rays cast.
     """
@@ -50,7 +54,7 @@ def gap_level(texels: TexelBuffer, job: TraceJob) -> tuple[NDArray[np.uint8], in
     cast = np.zeros(-(-n // TILE), np.int64)
 
     def work(begin: int, end: int) -> None:
-        # Use the median texel side of the tile, whose texels are neighbours.
+        # Use the median texel side of the tile for all its texels, which are neighbours.
         side = np.sqrt(np.median(texels.area[begin:end]))
         points = job.tile_points(begin, end)
         for share, sides in ((far, _FAR), (near, _NEAR)):

@@ -1,8 +1,8 @@
 """Patches: blocks of texels of one chart with similar normals, the surface elements of the radiosity solve.
 
 Texels inside narrow gaps and texels outside gaps belong to different patches. In gaps about a texel wide,
-light reaches only a few gap widths deep, and a patch has a single radiosity. Therefore each texel in such a
-gap is a patch, if at most `max_patches` texels lie in such gaps.
+light reaches only a few gap widths deep, but a patch has a single radiosity. Therefore each texel in such a
+gap is a separate patch, if at most `max_patches` texels lie in gaps of this width.
 
 Based on: Hanrahan, Salzman and Aupperle, A rapid hierarchical radiosity algorithm, 1991 (distant transport
 needs no fine elements); Smits, Arvo and Greenberg, A clustering algorithm for radiosity in complex
@@ -20,7 +20,7 @@ from baker.core.budget import MAX_PATCHES
 from baker.core.texels import TexelBuffer
 from baker.radiosity.kernels.regions import join_linked
 
-# Smallest gap level (0 to 2, see `narrow_gaps`) whose texels get smaller blocks.
+# Gap level, 0 to 2 (`radiosity.narrow_gaps`). Texels of this level or above get smaller blocks.
 NARROW = 2
 
 
@@ -87,13 +87,14 @@ def build_patches(
     texels : TexelBuffer
         The n entries.
     level : (n,) uint8, optional
-        Gap level 0 to 2 (`narrow_gaps`). Entries of different levels belong to different patches. Entries of
-        level 2 form smaller blocks, which are at most `max_patches` further patches.
+        Gap level, 0 to 2 (`radiosity.narrow_gaps`); 0 if omitted. Entries of different levels belong to
+        different patches. Entries of level 2 form smaller blocks, which add at most about `max_patches`
+        patches.
     max_patches : int
-        Largest number of patches outside narrow gaps.
+        Intended largest number of patches if narrow gaps had no smaller blocks.
     link : (m, 2) int32, optional
-        Pairs of neighbouring entries between which no surface lies (`sides.Sides.link`). In the charts of
-        these entries, a block is split into its connected parts.
+        Pairs of neighbouring entries between which no surface lies (`radiosity.sides.Sides.link`). In charts
+        with such pairs, a block is split into the parts that the pairs connect.
 
     Returns
     -------
@@ -122,7 +123,8 @@ def build_patches(
 def _smallest_block(
     texels: TexelBuffer, level: NDArray[np.uint8], chosen: NDArray[np.int64], max_patches: int
 ) -> int:
-    """Return the smallest side of blocks, texels, for which the chosen entries form `max_patches` or fewer.
+    """Return the smallest side of blocks, texels, for which the chosen entries form at most `max_patches`
+    blocks.
 
     chosen : (m,) int64, entries
     """
@@ -146,8 +148,8 @@ def _keys(texels: TexelBuffer, level: NDArray[np.uint8], side: NDArray[np.int64]
     size = texels.resolution
     page, rest = np.divmod(texels.pixel, size * size)
     row, column = np.divmod(rest, size)
-    # Quantise normals to 26 directions, the axes and diagonals. Rounding then splits no axis-aligned or
-    # diagonal surface.
+    # Quantise normals to 26 directions, the axes and diagonals. The factor 1.2 keeps axis-aligned and
+    # diagonal normals away from the rounding thresholds, so that their surfaces are not split.
     facing = np.rint(texels.normal.astype(np.float64) * 1.2).astype(np.int64) + 1
     direction = (facing[:, 0] * 3 + facing[:, 1]) * 3 + facing[:, 2]
     key = (page * size + row // side) * size + column // side

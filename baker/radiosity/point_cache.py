@@ -1,7 +1,8 @@
 """The 16 sample points of each texel, from which rays start.
 
-Points are computed tile by tile to save memory. In small scenes they are also stored for the following
-stages, because computing the points takes about a tenth of the time of tracing their rays.
+Points are computed tile by tile to save memory. In small scenes they are also stored for later stages,
+because
+computing the points takes about a tenth of the time of tracing their rays.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from baker.core.budget import MAX_CACHED_TEXELS
 from baker.kernels.surface import N_POINTS, Surface, place_points
 
-# Empty arrays: `place_points` then does not write triangles and barycentrics.
+# Empty arrays, for which `place_points` writes no triangles and barycentrics.
 _NO_TRIANGLE, _NO_BARY = np.zeros((0, 1), np.int32), np.zeros((0, 1, 2), np.float32)
 _EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
 
@@ -37,8 +38,8 @@ def points_of(
     chosen : (m,) int64
         Texel entries.
     wanted : (m, w) or (1, w) uint8
-        Numbers 0 to 15 of the wanted points of each chosen entry. A single row is used for all entries. By
-        default, all 16 points are returned.
+        Numbers, 0 to 15, of the wanted points of each chosen entry. With shape (1, w), the same numbers are
+        used for all entries. By default, all 16 points are returned.
 
     Returns
     -------
@@ -92,7 +93,7 @@ def tile_points(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return `origin` and `normal` (m, 16, 3) of entries begin to end, see `points_of`.
 
-    Reads them from `cache`, or stores them there.
+    If `cache` holds the points, they are read from it; else they are computed and stored there.
     """
     if cache is None:
         return points_of(surface, valid_points, np.arange(begin, end))
@@ -115,7 +116,7 @@ def some_points(
     """Return `origin` and `normal` (m, 1, 3) of one point of each chosen entry, see `points_of`.
 
     chosen : (m,) int64, entries; wanted : (m,) uint8, number of one point of each, 0 to 15
-    cache : read if it holds the points of all entries
+    cache : the points are read from it if it holds those of all entries; else they are computed
     """
     if cache is None or sum(end - begin for begin, end in cache.filled) < len(cache.origin):
         return points_of(surface, valid_points, chosen, wanted[:, None])

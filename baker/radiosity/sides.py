@@ -1,17 +1,20 @@
 """Splits texels that another surface passes through, and groups texels into regions.
 
-Examples are a floor that continues under a wall, a ceiling above walls, and a beam through a wall. A texel
-there has points on both sides of the other surface. A single value per texel would mix the light of both
-sides and show it on both.
+For example, a floor continues under a wall, or a beam passes through it. A texel where the two surfaces meet
+has
+points on both sides of the other surface. A single value per texel would mix the light of both sides.
 
 Therefore the points of such a texel are grouped by mutual visibility (`radiosity.kernels.sides`). Each group,
-called a side, becomes a texel entry (a row of `TexelBuffer`). The side with most points gets the texel's
-original entry, a front or back; fronts are stored in the page. The other sides get new entries after all
-backs. The new entries take part in light transport but are stored in no page.
+called a side, becomes a texel entry (a row of `TexelBuffer`). In general, the side with most points gets the
+texel's
+original entry, which is a front or a back; fronts are stored in the page. The other sides get new entries
+after all
+backs. The new entries take part in light transport but are not stored in the page.
 
 Neighbouring texels are linked if some of their points are mutually visible. The connected parts of a chart
-are its regions. Later filters do not mix values of different regions. Texels of a block that are not
-connected by links within the block belong to different patches.
+are its regions. Filters of the finished page do not mix values of different regions. Two texels of a block
+that
+no chain of links within the block connects belong to different patches (`radiosity.patches`).
 """
 
 from __future__ import annotations
@@ -42,14 +45,18 @@ from baker.radiosity.point_cache import points_of
 from baker.radiosity.trace_job import TraceJob
 from baker.trace.packets import PacketBuffers
 
-# Number per tile: of texels (_TILE), of texels whose points are grouped (_SUSPECTS), of pairs of entries
-# (_PAIRS).
+# Items per tile: texels that are tested (_TILE), texels whose points are grouped (_SUSPECTS), pairs of
+# neighbouring
+# entries (_PAIRS).
 _TILE = 4096
 _SUSPECTS, _PAIRS = 1024, 2048
-# Number of the point for the first test of a pair of neighbours. The second test uses all points of both.
+# Number of the point that the first test of two neighbours uses in each of them. The second test uses all
+# points.
 _ONE = np.zeros((1, 1), np.uint8)
-# _MANY_BACKS: share of rays that hit backs of one-sided surfaces above which a side is treated as outside the
-# model. _OUTSIDE: weight of the points of such a side; other points have the weight 1.
+# _MANY_BACKS: share of a side's rays that hit black backs, the backs of one-sided surfaces. Above it, the
+# side is
+# treated as outside the model. _OUTSIDE: weight of the points of a side outside the model; other points have
+# weight 1.
 _MANY_BACKS, _OUTSIDE = 0.25, 0.25
 _EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
 _BITS = np.uint32(1) << np.arange(N_POINTS, dtype=np.uint32)
@@ -57,7 +64,7 @@ _BITS = np.uint32(1) << np.arange(N_POINTS, dtype=np.uint32)
 
 @dataclass(frozen=True)
 class Sides:
-    """Texel entries after the split; see the module.
+    """Texel entries after the split of texels that another surface passes through.
 
     Attributes
     ----------
@@ -72,9 +79,9 @@ class Sides:
     member : (K,) int32
         Entries of all sides of the split texels; `SideTable.member` contains indices of this array.
     table : SideTable
-        Points of the split texels, from which the side of a hit is found.
+        Points of the split texels, from which kernels find the side that a ray hit.
     link : (m, 2) int32
-        Pairs of neighbouring entries with mutually visible points, in all charts of several regions.
+        Pairs of neighbouring entries with mutually visible points, in charts that another surface cuts.
     rays : int
         Number of rays cast.
     """
@@ -125,7 +132,7 @@ class _Entries(NamedTuple):
 
 @dataclass(frozen=True)
 class _Groups:
-    """The S entries whose points form several groups, or with a corner that no point sees.
+    """The S entries whose points form several groups, or that have a corner visible from none of the points.
 
     Attributes
     ----------
@@ -150,7 +157,7 @@ class _Groups:
         return count
 
     def entry(self, row: NDArray[np.int64], group: NDArray[np.int64] | np.int64) -> NDArray[np.int64]:
-        """Return the new entry of a group of the texel in a row of `owner`; group 0 keeps the old entry."""
+        """Return the entry of a group of the texel owner[row]; group 0 keeps the texel's old entry."""
         before = np.concatenate([[0], np.cumsum(self.count - 1)])[:-1]
         entry = np.where(group == 0, self.owner[row], self.n + before[row] + group - 1)
         return np.asarray(entry, np.int64)
@@ -186,8 +193,8 @@ def split_texels(texels: TexelBuffer, job: TraceJob) -> Sides:
     rays += int(cast.sum())
     entries = _cut(texels, surface, valid, side, groups)
     pair = _of_sides(neighbours(texels, crossed != 0), groups)
-    # Test the pairs with a split texel, and the pairs of two crossed texels: a surface exactly between two
-    # texels crosses both.
+    # Test the pairs with a split texel. Also test the pairs of two crossed texels, because a surface exactly
+    # between two texels crosses both without splitting them.
     doubtful: NDArray[np.bool_] = np.all(crossed[np.minimum(pair, n - 1)], axis=1)
     doubtful |= (np.isin(pair, groups.owner) | (pair >= n)).any(axis=1)
     connected: NDArray[np.bool_] = np.logical_not(doubtful)
@@ -249,9 +256,9 @@ def _group(job: TraceJob, chosen: NDArray[np.int64], side: NDArray[np.float32]) 
 def _with_heights(
     point: NDArray[np.float32], normal: NDArray[np.float32], side: NDArray[np.float32], buffers: PacketBuffers
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """Return points and normals, flattened to (m * w, 3), and the heights (m * w,) of segments from them.
+    """Return points and normals, flattened to (m * w, 3), and the heights (m * w,) from `point_heights`.
 
-    point, normal : (m, w, 3) float32; side : (m,) float32, metres; see `point_heights`
+    point, normal : (m, w, 3) float32; side : (m,) float32, metres, side length of each texel
     """
     height = np.zeros(point.shape[0] * point.shape[1], np.float32)
     flat, up = point.reshape(-1, 3), normal.reshape(-1, 3)
@@ -283,14 +290,14 @@ def _cut(
 
 
 def neighbours(texels: TexelBuffer, chosen: NDArray[np.bool_], *, both: bool = False) -> NDArray[np.int32]:
-    """Return pairs of entries of one chart whose texels share an edge: two fronts, or two backs.
+    """Return pairs of entries of one chart whose texels share an edge. Both are fronts, or both are backs.
 
     Parameters
     ----------
     texels : TexelBuffer
         Fronts and backs.
     chosen : (n,) bool
-        At least one entry of each pair is chosen.
+        Chosen entries. At least one entry of each pair is chosen.
     both : bool
         If true, both entries of each pair are chosen.
 
@@ -308,9 +315,10 @@ def neighbours(texels: TexelBuffer, chosen: NDArray[np.bool_], *, both: bool = F
 
 
 def _of_sides(pair: NDArray[np.int32], groups: _Groups) -> NDArray[np.int32]:
-    """Return (q, 2) int32: each side of one texel with each side of the other, for all pairs of texels.
+    """Replace each pair of texels by all pairs of a side of one texel and a side of the other.
 
     pair : (p, 2) int32, entries before the split
+    Returns (q, 2) int32, entries after the split.
     """
     if not len(groups.owner):
         return pair
@@ -331,7 +339,7 @@ def _of_sides(pair: NDArray[np.int32], groups: _Groups) -> NDArray[np.int32]:
 
 
 def _see(job: TraceJob, entries: _Entries, pair: NDArray[np.int32]) -> tuple[NDArray[np.bool_], int]:
-    """Return (m,) bool, whether some points of the two entries see each other, and the number of rays cast.
+    """Return (m,) bool, whether points of the entries see each other, and the number of rays cast.
 
     pair : (m, 2) int32, entries
     """
@@ -365,10 +373,10 @@ def _keep_largest(
     backs: NDArray[np.float64],
     rays: int,
 ) -> Sides:
-    """Store the largest side of each split texel in the texel's original entry, and number the regions.
+    """Give the best side of each split texel the texel's original entry, and number the regions.
 
     link : (m, 2) int32, pairs of neighbouring entries with mutually visible points, in the charts `cut`
-    cut : (c,) int32, charts of several regions or with split texels
+    cut : (c,) int32, charts with split texels, or with neighbouring texels that are not linked
     backs : (S, groups) float64, from `_back_share`
     """
     root = np.arange(len(entries.valid_points), dtype=np.int32)
@@ -414,14 +422,13 @@ def _back_share(job: TraceJob, entries: _Entries, groups: _Groups) -> tuple[NDAr
 def _order_sides(
     entries: _Entries, groups: _Groups, root: NDArray[np.int32], backs: NDArray[np.float64]
 ) -> tuple[NDArray[np.int32], SideTable, NDArray[np.int32]]:
-    """Choose the side that gets a split texel's original entry: the side with most points.
+    """Choose the side that gets a split texel's original entry: the side with the largest weight of points.
+    If many rays of a side hit backs of one-sided surfaces, its points have a smaller weight. Such a side
+    lies, for example, outside a room with one-sided walls, or under a one-sided floor. A side whose region
+    contains no unsplit texel is chosen only if this is true of all sides of the texel. An example of such a
+    region is the strip of a wall below the floor, if it is narrower than a texel.
 
-    If many rays of a side hit backs of one-sided surfaces, its points have a smaller weight. Such a side is
-    the outside of a room with one-sided walls, or the underside of a one-sided floor. A side whose region
-    contains no unsplit texel is chosen only if all sides are like this. An example is the part of a wall
-    below the floor, if it is narrower than a texel.
-
-    root : (n,) int32, smallest entry that is connected to each entry by links, from `join_linked`
+    root : (n,) int32, from `join_linked`: entries have the same root if links connect them
     backs : (S, groups) float64, from `_back_share`
 
     Returns
@@ -457,7 +464,7 @@ def _order_sides(
 def _measure(
     texels: TexelBuffer, surface: Surface, valid_points: NDArray[np.uint16], member: NDArray[np.int32]
 ) -> TexelBuffer:
-    """Return the texels with area, position, normal and centroid computed from each side's valid points.
+    """Return the texels, with area, position, normal and centroid of sides computed from their valid points.
 
     member : (K,) int32, entries of all sides of split texels
     """

@@ -6,13 +6,17 @@ With M = s + rho E, the radiosity without emission, and the patch areas A, this 
 
     (A / rho - A F) M = A s / rho
 
-The matrix is symmetric by reciprocity and positive definite for rho < 1. Conjugate gradients, preconditioned
-by A / rho, need a few dozen products with F. Jacobi sweeps would need thousands in a closed room of albedo
-0.99. A fixed number of bounces is computed with one product for each bounce after the first.
+The matrix A / rho - A F is symmetric by reciprocity, and positive definite for rho < 1. Conjugate gradients,
+preconditioned by A / rho, need a few dozen products with F. Jacobi sweeps would need thousands in a closed
+scene of
+albedo 0.99. If the number of bounces is fixed, one product is computed for each bounce after the first.
 
-The norms of conjugate gradients are sums over all patches. A dim room beside a sunlit street contributes
-almost nothing to these sums, so the iteration could stop before the room has converged. Therefore the
-residual of each patch and colour is compared with the light of that patch. The solve is repeated for the
+The norms of conjugate gradients are sums over all patches. Patches of a dim room beside a sunlit street
+contribute
+almost nothing to these sums, so the iteration could stop before these patches have converged. Therefore the
+residual of
+each patch and colour is compared with the exitance of that patch. Conjugate gradients are then started again
+for the
 residual of the patches that have not converged.
 
 Based on: Goral et al., Modeling the interaction of light between diffuse surfaces, 1984; Neumann,
@@ -38,21 +42,22 @@ from baker.radiosity.form_factors import FormFactorMatrix
 from baker.radiosity.kernels.conjugate_gradients import conjugate_step
 from baker.radiosity.kernels.form_factor import multiply, multiply_coloured
 
-# Estimated relative error of a patch's light at which the solve stops.
+# Relative error of a patch's exitance, estimated from its residual. Below it, the patch has converged.
 TOLERANCE = 3e-5
-# Largest number of iterations of conjugate gradients.
+# Largest total number of iterations of conjugate gradients.
 MAX_ITERATIONS = 1000
-# Smallest number of nonzero matrix elements per thread.
+# Number of stored matrix elements per thread. A further thread is used for each such number.
 _PART = 250_000
 # Lower limit of the exitance with which a patch's residual is compared, as a share of the largest source
-# exitance of the same colour. So nearly black patches do not delay the solve.
+# exitance of the same colour. Because of this limit, nearly black patches do not delay the solve.
 _DARK = 1e-15
-# Reduction of the residual norm after which conjugate gradients are restarted. By then the search directions
-# have lost orthogonality, and the updated residual differs from the true residual.
+# Ratio of the residual norm to its initial value. Below it, conjugate gradients are started again, because
+# the search
+# directions have lost orthogonality, and the updated residual differs from the true residual.
 _REDUCTION = 1e-12
-# Upper limit of albedo. A closed room of albedo 1 has no solution.
+# Upper limit of albedo: with albedo 1, a closed scene has no solution.
 MAX_ALBEDO = 0.999
-# Lower limit of albedo, because the symmetric form divides by albedo.
+# Lower limit of albedo: the symmetric form divides by albedo.
 MIN_ALBEDO = 1e-4
 
 
@@ -65,12 +70,14 @@ class Solution:
     irradiance : (P, 3) float64, lx
         RGB of light that was reflected at least once.
     iterations : int
-        Iterations of conjugate gradients; for a fixed number of bounces, the products with the matrix.
+        Number of iterations of conjugate gradients; with a fixed number of bounces, of products with the
+        matrix.
     residual : float
-        Norm over patches |s + rho F M - M| / |s|, the largest of the three colours.
+        |s + rho F M - M| / |s|, with Euclidean norms over the patches; the largest of the three colours.
     patch_error : float
-        Largest |s + rho F M - M| / ((1 - rho) M) of a patch and colour. It estimates the largest relative
-        error of a patch's light. It is a bound in a closed room of uniform light and albedo.
+        Largest |s + rho F M - M| / ((1 - rho) M) of a patch and colour, an estimate of the largest relative
+        error of a patch's exitance M. In a closed scene of uniform light and albedo, it is an upper bound of
+        that error.
     """
 
     irradiance: NDArray[np.float64]
@@ -104,18 +111,19 @@ def solve_radiosity(
     matrix : FormFactorMatrix
         F of P patches.
     source : (P, 3) float64, lx
-        Direct light that patches reflect.
+        s, the direct light that patches reflect.
     albedo : (P, 3) float64
         0 to 1; clipped to `MIN_ALBEDO` and `MAX_ALBEDO`.
     area : (P,) float64, m2
         Areas of the patches.
     bounces : int or None
-        Number of reflections; None means until converged. The final gather adds one more bounce, so N bounces
+        Number of reflections; None means until converged. The final gather adds the last bounce, so N bounces
         need N - 1 products here.
     progress : Progress
         Called for each product.
     threads : int
-        Number of threads for products. One thread sums each matrix row, so the result does not depend on it.
+        Number of threads for products. Each matrix row is summed by one thread, so the result does not depend
+        on the number.
 
     Returns
     -------
@@ -156,8 +164,8 @@ def _converge(
         share = goal.share(rest, exitance)
         if (share <= 1.0).all() or iterations >= MAX_ITERATIONS:
             break
-        # Leave out converged patches, because the rounding errors of a bright room exceed the residual of a
-        # dim room.
+        # Leave out converged patches, because the rounding errors of bright patches exceed the residual of
+        # dim patches.
         rest[share <= goal.MARGIN] = 0.0
         before = iterations
         iterations = _conjugate_gradients(product, exitance, rest, albedo, area, goal, progress, before)
@@ -195,7 +203,8 @@ class _Product:
     matrix : FormFactorMatrix
         F of P patches.
     threads : int
-        Largest number of threads. One thread sums each matrix row, so the result does not depend on it.
+        Largest number of threads. Each matrix row is summed by one thread, so the result does not depend on
+        the number.
     """
 
     def __init__(self, matrix: FormFactorMatrix, threads: int) -> None:
@@ -237,11 +246,11 @@ class _Goal:
 
     Attributes
     ----------
-    tolerance : (P, 3) float64, allowed residual as a share of the patch's exitance
-    dark : (3,) float64, lx, lower bound of the exitance that `tolerance` is multiplied by
+    tolerance : (P, 3) float64, allowed residual as a share of max(exitance, `dark`)
+    dark : (3,) float64, lx
     """
 
-    # Share of the allowed residual at which conjugate gradients stop.
+    # Residual as a share of the allowed residual. If no patch exceeds it, conjugate gradients stop.
     MARGIN: ClassVar[float] = 0.5
     tolerance: NDArray[np.float64]
     dark: NDArray[np.float64]
@@ -298,7 +307,7 @@ def energy_audit(
     indirect: NDArray[np.float64],
     albedo: NDArray[np.float64],
 ) -> dict[str, float]:
-    """Return the luminous flux that arrives at surfaces from lights, and how much is absorbed or escapes.
+    """Return the luminous flux from lights to surfaces, and the parts of it that are absorbed and escape.
 
     Parameters
     ----------
@@ -319,8 +328,9 @@ def energy_audit(
     -------
     dict of str to float
         Fluxes in lm, means of R, G and B. `emitted` arrives at surfaces directly from lights. `absorbed` ends
-        at surfaces, including black backs and BLEND surfaces. `escaped` leaves the scene after a reflection.
-        emitted = absorbed + escaped, up to the residual of the solve and the error of the matrix row sums.
+        at surfaces, including the black backs of one-sided surfaces and BLEND surfaces. `escaped` leaves the
+        scene after a reflection. Except for the residual of the solve and the error of the matrix row sums,
+        emitted = absorbed + escaped.
     """
     flux = area[:, None] / 3.0
     leaving = reflected + albedo * indirect

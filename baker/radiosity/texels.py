@@ -1,4 +1,4 @@
-"""Texels of the atlas: the triangles in each texel, and its mean position, normal and albedo."""
+"""Texels of the atlas: the triangles in each texel, and the texel's position, normal and albedo."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _TILE = 4096
 def build_texels(
     geometry: Geometry, shading: Shading, atlas: Atlas, *, seed: int, threads: int, progress: Progress
 ) -> tuple[TexelBuffer, Surface]:
-    """Find the texels of all pages, and the mean attributes of the triangles that cover each texel.
+    """Find the texels of all pages, and the area, position, normal and albedo of each texel.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class _Overlaps(NamedTuple):
     pixel : (n,) int64, (page * resolution + row) * resolution + column of each texel
     first : (n + 1,) int64, texel i is covered by the triangles `entry[first[i] : first[i + 1]]`
     entry : (m,) int32, triangles
-    area : (m,) float32, area of the texel that each of these triangles covers, texels
+    area : (m,) float32, area of each of these triangles inside its texel, texels
     chart : (n,) int32, chart that covers the largest area of each texel
     """
 
@@ -99,7 +99,7 @@ class _Overlaps(NamedTuple):
 
 
 class _Means(NamedTuple):
-    """Area-weighted means over each of the n_front texels; all float32.
+    """Attributes of the n_front front texels; all float32. See `kernels.texel_info`.
 
     area : (n_front,), m2 of surface inside the texel; centroid : (n_front, 2), texels from the texel centre
     position, normal : (n_front, 3), world; albedo : (n_front, 3)
@@ -115,7 +115,7 @@ class _Means(NamedTuple):
 def _surface(
     geometry: Geometry, atlas: Atlas, found: _Overlaps, front: NDArray[np.int32], seed: int
 ) -> Surface:
-    """Return the n entries as arrays for kernels; `front` (n,) int32 is the front entry of each."""
+    """Return the n entries as arrays for kernels; `front` (n,) int32 is the front entry of each entry."""
     return Surface(
         position=geometry.position,
         normal=geometry.normal,
@@ -146,7 +146,7 @@ def _two_sided(geometry: Geometry, found: _Overlaps) -> NDArray[np.int64]:
 def _means(
     geometry: Geometry, shading: Shading, surface: Surface, n_front: int, threads: int, progress: Progress
 ) -> _Means:
-    """Compute the means over all front texels."""
+    """Compute the attributes of all front texels."""
     area, centroid = np.zeros(n_front, np.float32), np.zeros((n_front, 2), np.float32)
     position, normal = np.zeros((n_front, 3), np.float32), np.zeros((n_front, 3), np.float32)
     scale = _metres2_per_texel(geometry, surface.size)
@@ -218,8 +218,8 @@ def _with_backs(
 def _lookup(pixel: NDArray[np.int64], size: int, n_pages: int) -> NDArray[np.int32]:
     """Return (P * H * W,) int32: the front entry of each pixel, -1 for none.
 
-    A pixel without an entry gets the entry of a neighbour: of one that shares an edge, else of one that
-    shares a corner.
+    A pixel without an entry gets the entry of a neighbour that shares an edge. If there is none, it gets the
+    entry of a neighbour that shares a corner.
     """
     pages = np.full((n_pages, size + 2, size + 2), -1, np.int32)
     inner = pages[:, 1:-1, 1:-1]

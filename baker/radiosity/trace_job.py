@@ -42,7 +42,7 @@ class TraceJob:
     chart : (n,) int32, optional
         Chart of each entry. With None, emitters are chosen as if all entries were in one chart.
     point_cache : PointCache, optional
-        Points that several stages share. With None, each stage computes the points of its tiles.
+        Cache of points, which several stages share. With None, each stage computes the points of its tiles.
     runner : TileRunner
         Runs the tiles of a stage in this process or in others.
     """
@@ -72,7 +72,7 @@ class TraceJob:
         return new_packet_buffers(self.tracer)
 
     def occlusion_buffers(self, *, solid: bool = False) -> PacketBuffers:
-        """Return packet buffers for rays without transmittance: a ray is blocked or not.
+        """Return packet buffers for occlusion rays, which are blocked or not and have no transmittance.
 
         Parameters
         ----------

@@ -4,7 +4,8 @@ The share of a patch's light that remains after n reflections is
 
     s_n = (rho F) s_{n-1},   s_0 = 1        rho: albedo, F: form factors
 
-In a closed room of albedo rho, s_n = rho^n, and all light is 1 / (1 - rho) times the direct light.
+In a closed scene of uniform albedo rho, s_n = rho^n, and all bounces multiply the direct light by 1 / (1 -
+rho).
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from baker.core.scene import SceneWarning
 from baker.radiosity.form_factors import FormFactorMatrix
 from baker.radiosity.solve import MAX_ALBEDO, Solution, apply, solve_warnings
 
-# Albedo above which patches are tested.
+# Albedo of a patch. Above it, the patch is tested.
 NEARLY_WHITE = 0.98
 # Number n of reflections in the test.
 REFLECTIONS = 20
-# Ratio of all light to direct light above which there is a warning. A closed room of albedo 0.95 has this
+# Ratio of all light to direct light. Above it, there is a warning. A closed scene of albedo 0.95 has this
 # ratio.
 MOST_GAIN = 20.0
 
@@ -72,8 +73,8 @@ def trapped_light(
     area : (P,) float64, m2
         Areas of the patches.
     bounces : int or None
-        Number of reflections of the solve; None means until converged. There is no warning below `MOST_GAIN`
-        bounces, because N bounces multiply light by at most N + 1.
+        Number of reflections of the solve; None means until converged. With fewer than `MOST_GAIN` bounces
+        there is no warning, because N bounces multiply light by at most N + 1.
     """
     white = albedo.max(axis=1) > NEARLY_WHITE
     if not white.any() or (bounces is not None and bounces < MOST_GAIN):
@@ -88,7 +89,8 @@ def trapped_light(
         return []
     share = 100.0 * float(area[trapped].sum() / area.sum())
     each = float(np.average(left[trapped], weights=area[trapped])) ** (1.0 / REFLECTIONS)
-    # Limit the mean albedo, because row sums of F are estimated with rays and may slightly exceed 1.
+    # Limit the share of light that remains after each reflection, because row sums of F are estimated with
+    # rays and may slightly exceed 1.
     most = 1.0 / (1.0 - min(each, MAX_ALBEDO))
     message = (
         f"surfaces that reflect over {100 * NEARLY_WHITE:g} % see little but each other "

@@ -45,7 +45,8 @@ def build_triangle_lookup(geometry: Geometry, texels: TexelBuffer, emitters: Emi
     row[:, UV_EDGE_1 : UV_EDGE_1 + 2] = uv[:, 1] - uv[:, 0]
     row[:, UV_EDGE_2 : UV_EDGE_2 + 2] = uv[:, 2] - uv[:, 0]
     row[:, PAGE] = geometry.page
-    # Treat double-sided triangles as one-sided if there are no back entries, because none covers a texel.
+    # If there are no back entries, no double-sided triangle covers a texel. Treat all triangles as one-sided
+    # then, because lookups of backs would find nothing.
     row[:, DOUBLE_SIDED] = geometry.double_sided & (texels.n > texels.n_front)
     row[:, FACE_NORMAL : FACE_NORMAL + 3] = geometry.face_normal
     row[:, FACE_AREA] = geometry.area

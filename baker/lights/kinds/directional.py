@@ -1,4 +1,4 @@
-"""Directional light: parallel light of E_light lux on a perpendicular surface, such as sunlight.
+"""Directional light: parallel light, such as sunlight, that causes E_light lux on a perpendicular surface.
 
     E = E_light cos(theta)
 

@@ -17,7 +17,7 @@ from baker.core.light_kind import LIGHT_KINDS, EmissionProfile, LightJson, Light
 from baker.core.scene import PunctualLight
 from baker.trace.jit import inner, kernel, larger
 
-# TFAR of shadow rays, as a share of the distance to the light.
+# TFAR of shadow rays, as a share of the distance to the light: the rays end just before the light.
 _SHORT = np.float32(0.99999)
 
 

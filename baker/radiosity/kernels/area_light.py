@@ -3,9 +3,13 @@
 
     E = 1/n sum L cos / (p_light + (n_hemisphere / n) p_cosine)
 
-n is the number of shadow rays, and p are probability densities per steradian. The balance heuristic combines
-these light samples with n_hemisphere rays that hit the same emitters (`emitter_hit`). Where no shadow ray is
-blocked, the closed form of `polygon_light` replaces both.
+The sum is over the n shadow rays, with the radiance L of the emitter and the cosine at the texel. p are
+probability
+densities per steradian. The balance heuristic combines these light samples with n_hemisphere rays that hit
+the
+same emitters (`emitter_hit`). If no shadow ray of sixteen neighbouring texels is blocked and the emitters are
+few,
+untextured and opaque, the closed form of `radiosity.kernels.polygon_light` replaces both.
 
 Based on: Veach and Guibas, Optimally combining sampling techniques, 1995.
 """
@@ -41,15 +45,17 @@ from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, ORG_X, ORG_Y, ORG_Z, PACKET
 
 _f = np.float32
 _INV_PI = np.float32(1.0 / math.pi)
-# TFAR of shadow rays, as a share of the distance to the emitter, so that they do not hit it.
+# TFAR of shadow rays, as a share of the distance to the emitter: the rays end before they hit the emitter.
 _SHORT = np.float32(0.9999)
-# Smallest number of samples per texel and emitter for which the closed form is used.
+# Number of samples per texel and emitter. Below it, the closed form is not used.
 _SAMPLES_PER_EMITTER = 8
-# Early out: sixteen texels are treated as unoccluded if they have at least this many test rays per texel and
-# no test ray is blocked.
+# Early out (see `light_samples`): smallest mean number of test rays per texel. With fewer test rays, texels
+# are
+# not treated as unoccluded.
 _MIN_TESTS = 8
-# Rows of `sampled`, the data of the emitter that each lane samples: corner 0, edges 1 and 2, normal (3 each),
-# probability density per m2, 1 if two-sided, radiance (3).
+# Rows of `sampled`, the data of the emitter that each lane samples: corner 0, edges 1 and 2 and normal (3
+# each),
+# probability density per m2, 1 if two-sided else 0, radiance (3).
 _CORNER, _EDGE_1, _EDGE_2, _NORMAL, _DENSITY, _TWO_SIDED, _RADIANCE = 0, 3, 6, 9, 12, 13, 14
 _SAMPLED_ROWS = 17
 # Working memory of `light_samples`.
@@ -70,11 +76,11 @@ def mis_weighted(cosine, density, n_light, n_hemisphere):
 
 @inner
 def load_points(rays, facing, origin, normal, group, lanes, k):
-    """Copy origin and normal of point k of `lanes` texels from texel `group` on, by lane.
+    """Copy origin and normal of point k of texel `group` + lane into each lane.
 
     rays : (21 * 16,) float32 output, a packet whose origins are set
     facing : (3 * 16,) float32 output, normals
-    origin, normal : (m, 16, 3) float32, metres, world, and unit
+    origin, normal : (m, 16, 3) float32, metres and unit vectors, world
     """
     for lane in range(lanes):
         for a in range(3):
@@ -86,9 +92,10 @@ def load_points(rays, facing, origin, normal, group, lanes, k):
 def choose_lanes(row, starts, chance, cumulative, first, second, seeds, shared, uv, chosen, sampled):
     """Sample an emitter for every lane, and copy its data to `sampled`.
 
-    row (M, 24), starts (C + 1,), chance, cumulative (C,) : see `emitters.TileEmitters`
+    row (M, 24), starts (C + 1,), chance, cumulative (C,) : see `kernels.emitters.TileEmitters`
     first, second : uint32, bit-reversed Sobol numbers of the sample
-    seeds : (2 * 16,) uint32, see `lane_seeds`; shared : uint32, see `sampling`
+    seeds : (2 * 16,) uint32, from `lane_seeds`
+    shared : uint32, from `kernels.sampling.shared_bits_mask`
     uv : (2 * 16,) float32 output, uniform numbers from which the point on the emitter is sampled
     chosen : (16,) int64 output, emitters; sampled : (17 * 16,) float32 output, see the row names
     """
@@ -103,8 +110,8 @@ def choose_lanes(row, starts, chance, cumulative, first, second, seeds, shared, 
         sampled[_DENSITY * PACKET_WIDTH + lane] = density
         same = same and m == chosen[0]
     if same:
-        # All lanes sample one emitter, the usual case because neighbouring texels share the first bits of
-        # their random numbers. These loops are vectorised.
+        # All lanes sample one emitter. This is the usual case, because neighbouring texels share the first
+        # bits of their random numbers. Numba vectorises these loops.
         m = chosen[0]
         for a in range(3):
             for lane in range(PACKET_WIDTH):
@@ -129,7 +136,7 @@ def choose_lanes(row, starts, chance, cumulative, first, second, seeds, shared, 
 
 @inner
 def aim_at_emitters(rays, facing, uv, sampled, n_light, first_n, second_n, weight):
-    """Write the shadow ray of every lane, and the factors from its radiance to both irradiance estimates.
+    """Write the shadow ray of every lane, and its factors from radiance to both irradiance estimates.
 
     rays : (21 * 16,) float32, a packet with origins; directions and TFAR are set
     facing : (3 * 16,) float32, unit normals of the points
@@ -195,20 +202,21 @@ def light_samples(
     """Add the irradiance of texels from light samples; return the number of shadow rays cast.
 
     Early out: first, one test ray is traced from each point of sixteen neighbouring texels. If none of these
-    up to 256 rays is blocked, the other rays are not traced and are treated as unblocked. If the share p of
-    the light is blocked, the expected error is p (1 - p)^256 of the light, at most 0.15 %. If there are few
-    emitters and none is textured, the closed form replaces the samples of such texels. Hemisphere rays then
-    add nothing.
+    up to 256 rays is blocked, the texels are treated as unoccluded: their other rays are not traced. If in
+    truth the share p of the light is blocked, the expected error is p (1 - p)^256 of the light, at most 0.15
+    %. If the emitters are few, untextured and opaque, the closed form replaces the samples of unoccluded
+    texels. Hemisphere rays that hit these emitters then add nothing.
 
-    origin, normal : (m, 16, 3) float32, metres, world, and unit; points of m texels
-    emitters : TileEmitters; shading : Shading or None, from `emitters.needed_shading`
+    origin, normal : (m, 16, 3) float32, metres and unit vectors, world; points of m texels
+    emitters : TileEmitters; shading : Shading or None, from `kernels.emitters.needed_shading`
     buffers : PacketBuffers; begin : number of the first texel, which seeds the random numbers
-    sobol_points : (n, 2) uint32, one row per shadow ray; shared : uint32, see `sampling`
+    sobol_points : (n, 2) uint32, one row per shadow ray
+    shared : uint32, from `kernels.sampling.shared_bits_mask`
     hemisphere : (2,) float64, numbers of hemisphere rays in the MIS weights of both estimates
     analytic : (m,) uint8, set to 1 for texels for which the closed form is used
     out : (m, 6) float32, lx, added to: two RGB estimates, which differ in their MIS weights
-    second : (m,) float32 output, sum of squares of the 16 points' contributions R + G + B to the first
-        estimate
+    second : (m,) float32 output, sum over the 16 points of x^2, where x is the point's contribution R + G + B
+        to the first estimate
     """
     n_samples = len(sobol_points)
     scene, occluded, width = buffers.scene, buffers.occluded, buffers.width
@@ -221,7 +229,7 @@ def light_samples(
     if shading is not None:
         any_alpha = len(shading.alpha.slot) > 0
     # Allow the closed form if emitters are few (see `_SAMPLES_PER_EMITTER`), untextured and opaque.
-    # Occluders with alpha are found by the early-out tests.
+    # Whether occluders have alpha is found by the early-out tests.
     untextured = len(row) * _SAMPLES_PER_EMITTER <= n_samples
     for m in range(len(row) if untextured else 0):
         untextured = untextured and row[m, TEXTURED] == _f(0.0)
@@ -245,7 +253,7 @@ def light_samples(
             for j in range(6 * PACKET_WIDTH):
                 part[k, j] = _f(0.0)
         tested = blocked = 0
-        # Compute the closed form. If it is 0, emitters do not light these texels.
+        # Compute the closed form. If it is 0, no emitter lights these texels.
         if untextured:
             unoccluded_irradiance(origin, normal, group, lanes, row, found)
             lit = False
@@ -282,8 +290,8 @@ def light_samples(
                         on[lane] = -1 if lane < lanes and weight[lane] > _f(0.0) else 0
                         asked -= on[lane]
                     if shading is not None:
-                        # Multiply by alpha, because cut-out parts emit nothing. Gather rays pass through
-                        # these parts.
+                        # Multiply by the emitter's alpha, because cut-out parts emit nothing. Gather rays
+                        # need no such factor, because they pass through these parts.
                         for lane in range(lanes if any_alpha else 0):
                             m = chosen[lane]
                             b1, b2 = on_triangle(row, m, uv[lane], uv[PACKET_WIDTH + lane])
@@ -322,7 +330,7 @@ def light_samples(
                             light *= transmittance(buffers.blend, c, lane)
                             part[k, c * PACKET_WIDTH + lane] += light * weight[lane]
                             part[k, (3 + c) * PACKET_WIDTH + lane] += light * weight[PACKET_WIDTH + lane]
-        # Use the closed form if no test ray is blocked. It has no variance, so `second` is unchanged.
+        # Use the closed form if no test ray is blocked. It has no variance, so `second` stays 0.
         if untextured and blocked == 0 and tested >= _MIN_TESTS * lanes and n_samples >= N_POINTS:
             for lane in range(lanes):
                 analytic[group + lane] = 1
@@ -351,10 +359,10 @@ def light_samples(
 def emitter_hit(
     row, emitter_row, chance, cumulative, prim, m, direction, normal, distance, n_light, n_hemisphere
 ):
-    """Return the factor from the radiance of emitter m to the irradiance that one hemisphere ray adds.
+    """Return irradiance / radiance for a hemisphere ray that hits emitter m: what the ray adds.
 
     row : (T, 16) float32, see `TriangleLookup`; prim : triangle that the ray hits
-    emitter_row (M, 24), chance, cumulative (C,) : see `emitters.TileEmitters`
+    emitter_row (M, 24), chance, cumulative (C,) : see `kernels.emitters.TileEmitters`
     direction, normal : tuples of three float32, unit direction of the ray, and unit normal of the texel's
         point
     distance : distance of the hit, metres

@@ -17,18 +17,19 @@ _three = scratch((3,), np.float64)
 def conjugate_step(
     product, albedo, weight, direction, exitance, residual, allowed, dark, active, size, worst
 ):
-    """Advance the solution of (I - rho F) x = b by one step, separately for each colour.
+    """Advance the solution x of (I - rho F) x = b by one step, for each colour separately.
 
     product : (P, 3) float64, F times `direction`; overwritten
-    albedo, weight : (P, 3) float64, rho, and A / rho, the weight of the scalar product (A: patch area)
+    albedo : (P, 3) float64, rho
+    weight : (P, 3) float64, A / rho, the weight of the scalar product; A is the patch area
     direction : (P, 3) float64, search direction; updated
     exitance : (P, 3) float64, x, the solution; updated
     residual : (P, 3) float64, b - (I - rho F) x; updated
-    allowed : (P, 3) float64, allowed residual, as a share of exitance
-    dark : (3,) float64, lower bound of the exitance that `allowed` is multiplied by
+    allowed : (P, 3) float64, allowed residual, as a share of max(exitance, `dark`)
+    dark : (3,) float64, lx
     active : (3,) uint8, 1 for colours to advance; set to 0 if the curvature along `direction` is not positive
     size : (3,) float64, weighted squared norm of the residual; updated
-    worst : (3,) float64 output, largest residual / allowed residual of a patch
+    worst : (3,) float64 output, largest ratio of residual to allowed residual over all patches
     """
     n = len(residual)
     curvature, step, ratio = _three(), _three(), _three()

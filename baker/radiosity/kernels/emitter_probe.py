@@ -13,7 +13,7 @@ from baker.trace.jit import inner, kernel, smaller
 from baker.trace.packets import DIR_X, ORG_X, PACKET_WIDTH, TFAR
 
 _f = np.float32
-# TFAR of shadow rays, as a share of the distance to the emitter, so that they do not hit it.
+# TFAR of shadow rays, as a share of the distance to the emitter: the rays end before they hit the emitter.
 _SHORT = np.float32(0.9999)
 # Hash input for dimension 0 of a ray's uniform numbers; dimension d uses _SALT + d.
 _SALT = 77
@@ -24,14 +24,14 @@ _INV_2_24 = np.float32(5.9604645e-08)
 def probe_clusters(origin, normal, row, first, buffers, bounds, chosen, n_rays, asked, seen):
     """Trace shadow rays from blocks of texels to each cluster, and count the unblocked rays.
 
-    origin, normal : (m, 16, 3) float32, metres, world, and unit; points of the texels of a tile
-    row (M, 24) float32, first (C + 1,) int32 : see `emitters.Emitters`
+    origin, normal : (m, 16, 3) float32, metres and unit vectors, world; points of the texels of a tile
+    row (M, 24) float32, first (C + 1,) int32 : see `kernels.emitters.Emitters`
     buffers : PacketBuffers
     bounds : (B + 1,) int64, block b contains the texels bounds[b] to bounds[b + 1] - 1
     chosen : (C,) bool, clusters to probe
-    n_rays : rays from each block to each cluster, from points distributed over the block
-    asked : (B, C) int32 output, rays with positive cosines at the texel and at the emitter
-    seen : (B, C) int32 output, rays of `asked` that nothing blocks
+    n_rays : number of rays from each block to each cluster; their origins are distributed over the block
+    asked : (B, C) int32 output, number of rays with positive cosines at the texel and at the emitter
+    seen : (B, C) int32 output, how many of these rays are unblocked
     """
     scene, occluded, width = buffers.scene, buffers.occluded, buffers.width
     query = buffers.query
@@ -75,7 +75,8 @@ def _aim(rays, lane, normal, i, k, row, start, end, code):
 
     rays : (21 * 16,) float32, a packet with origins; the direction and TFAR of `lane` are set
     normal : (m, 16, 3) float32, unit; the ray starts at point [i, k]
-    row : (M, 24) float32, see `emitters.Emitters`; the cluster contains the emitters `start` to `end` - 1
+    row : (M, 24) float32, see `kernels.emitters.Emitters`
+    start, end : the cluster contains the emitters `start` to `end` - 1
     code : uint32, number of the ray
     Returns -1 if the cosines at the texel and at the emitter are positive, else 0.
     """
@@ -88,7 +89,7 @@ def _aim(rays, lane, normal, i, k, row, start, end, code):
             high = middle
         else:
             m = middle + 1
-    # Sample a point on it.
+    # Sample a point on the emitter.
     b1, b2 = triangle_barycentric(_uniform(code, 3), _uniform(code, 4))
     received = sent = _f(0.0)
     for a in range(3):

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Form factors of patches from cosine-weighted rays, and operations on their matrix.
+"""Form factors of patches from cosine-weighted rays, and operations on the form-factor matrix.
 
     F_ij = share of the light leaving patch i that arrives at patch j
          = share of the cosine-weighted rays of patch i that hit patch j
@@ -32,12 +32,12 @@ from baker.trace.packets import (
 )  # fmt: skip
 
 # Values of `target` that are not patches:
-#
-#     LOST        the ray ended on a surface without a patch
+# LOST        the ray ended on the back of a one-sided surface, or on a surface without a texel
 #     SKY         the ray left the scene
-#     SPLIT - s   the ray hit the split texel in row s of the `SideTable`
+# SPLIT - s   the ray hit a split texel, which another surface divides into sides (`radiosity.sides`);
+#             s is its row in the `SideTable`
 LOST, SKY, SPLIT = -1, -2, -3
-# Columns of `tally`: number of rays that left the scene, and that ended on black backs or uncovered texels.
+# Columns of `tally`: number of rays that left the scene, and number of rays whose target is LOST.
 ESCAPED, ABSORBED = 0, 1
 
 
@@ -47,12 +47,12 @@ def cast_form_factors(
 ):
     """Trace R rays from each of m patches, and write the patch that each ray hits.
 
-    origin, normal : (m, R, 3) float32, metres, world, and unit; one point per ray
+    origin, normal : (m, R, 3) float32; origins of the rays in metres, and unit normals; world space
     lookup : TriangleLookup; seen : SeenPatch, maps hits to patches
     buffers : PacketBuffers; begin : number of the first patch, which seeds the random numbers
-    sobol_points : (R, 2) uint32, one row per ray; shared : uint32, see `sampling`
+    sobol_points : (R, 2) uint32, one row per ray; shared : uint32, from `kernels.sampling.shared_bits_mask`
     target : (m, R) int32 output, patch that was hit, LOST or SKY
-    tally : (P, 2) int32, counts are added, see the column names
+    tally : (P, 2) int32, columns ESCAPED and ABSORBED; counts are added
     colour : (m, R, 3) float32 output, RGB transmittance of each ray; (0, R, 3) if no surface colours light
     """
     scene, intersect, width = buffers.scene, buffers.intersect, buffers.width
@@ -121,9 +121,10 @@ def cast_form_factors(
 
 @inner
 def _note_colour(blend, colour, group, lanes, r):
-    """Write the transmittance of ray r of `lanes` patches from patch `group` on.
+    """Write the transmittance of ray r of the patches `group` to `group + lanes - 1`.
 
-    blend : `PacketBuffers.blend`; colour : (m, R, 3) float32 output, or (0, R, 3): nothing is written
+    blend : `PacketBuffers.blend`
+    colour : (m, R, 3) float32 output; with shape (0, R, 3), nothing is written
     """
     if blend is None or len(colour) == 0:
         return
@@ -154,10 +155,11 @@ def multiply(first, column, value, exitance, irradiance):
 
 @kernel
 def multiply_coloured(first, column, value, transmittance, exitance, irradiance):
-    """Write the product of F and `exitance` to `irradiance`, with F_ij times its RGB transmittance.
+    """Write the irradiance sum_j T_ij F_ij M_j of each patch i, where T_ij is the RGB transmittance.
 
     first (P + 1,) int64, column (nnz,) int32, value (nnz,) float32 : F in CSR
-    transmittance : (nnz, 3) float32; exitance : (P, 3) float64, lx; irradiance : (P, 3) float64 output, lx
+    transmittance : (nnz, 3) float32, T; exitance : (P, 3) float64, M, lx
+    irradiance : (P, 3) float64 output, lx
     """
     for i in range(len(first) - 1):
         red = green = blue = 0.0
@@ -174,10 +176,11 @@ def multiply_coloured(first, column, value, transmittance, exitance, irradiance)
 
 @kernel
 def transpose(first, column, value, at, out_column, out_value):
-    """Write the transpose of a square CSR matrix; columns ascend within its rows.
+    """Write the transpose of a square CSR matrix. In each row of the transpose, columns ascend.
 
     first (P + 1,) int64, column (nnz,) int32, value (nnz,) float32 : the matrix
-    at : (P,) int64, index of the first element of each row of the transpose; the row's end on return
+    at : (P,) int64, on entry, index of the first element of each row of the transpose; on return, index after
+        its last element
     out_column (nnz,) int32, out_value (nnz,) float32 : output
     """
     for i in range(len(first) - 1):
@@ -196,15 +199,17 @@ def merge_reciprocal_estimates(
 
         F_ij' = (F_ij + F_ji) A_j / (A_i + A_j)
 
-    The variance of A_i F_ij is proportional to A_i. Therefore the optimal weight of F_ij is A_j / (A_i +
-    A_j), and the optimal weight of the reciprocal estimate is A_i / (A_i + A_j).
+    All patches cast the same number of rays, R. So the variance of the estimate of A_i F_ij is about A_i (A_i
+    F_ij) / R. Because A_i F_ij = A_j F_ji, the variances of both estimates are in the ratio A_i : A_j.
+    Therefore the optimal weight of F_ij is A_j / (A_i + A_j), and the optimal weight of the reciprocal
+    estimate is A_i / (A_i + A_j).
 
     first (P + 1,) int64, column (nnz,) int32, value (nnz,) float32 : F in CSR, columns of a row ascend
     other_first, other_column, other_value : transpose of F, whose row i contains F_ji
     area : (P,) float64, m2
-    out_first (P + 1,), out_column (2 nnz,), out_value (2 nnz,) : output, merged F in CSR; the end may be
-        unused
-    Returns sum A_i F_ij and sum |A_i F_ij - A_j F_ji| before merging.
+    out_first (P + 1,), out_column (2 nnz,), out_value (2 nnz,) : output, merged F in CSR; items of
+        `out_column` and `out_value` beyond out_first[P] are not written
+    Returns sum A_i F_ij and sum |A_i F_ij - A_j F_ji|, both of the matrix before merging.
     """
     at = 0
     exchanged = 0.0
@@ -239,18 +244,21 @@ def merge_reciprocal_estimates(
 def sinkhorn_balance(first, column, value, goal, slack, factor, steps):
     """Replace F_ij by d_i F_ij d_j, with factors d for which the row sums are close to `goal`.
 
-    A_i F_ij stays symmetric. The factors satisfy
+    So A_i F_ij stays symmetric. The factors satisfy
 
         d_i sum_j F_ij d_j = goal_i + slack_i (1 - d_i)
 
-    Without slack, a large patch whose few rays all missed a small patch would lower the small patch's
-    accurate row sum. The solution minimises a convex function of log d. Each step finds the exact minimum
-    along one coordinate, so the steps need no damping.
+    If the rays of a large patch all miss a small patch, the measured row sum of the large patch is too low.
+    Without slack, its factor d would become too small. This d also multiplies the accurate form factor from
+    the small patch to the large patch. The slack limits how far d differs from 1.
+
+    The solution minimises a convex function of log d. Each update of one factor d_i finds the exact minimum
+    along that coordinate, so no damping is needed.
 
     first (P + 1,) int64, column (nnz,) int32, value (nnz,) float32 : F in CSR; value is changed in place
-    goal : (P,) float64, row sums; slack : (P,) float64, uncertainty of each row sum
+    goal : (P,) float64, measured row sums; slack : (P,) float64, uncertainty of each measured row sum
     factor : (P,) float64, d; ones on entry
-    steps : int, largest number of passes over all coordinates
+    steps : int, largest number of passes; a pass updates all P factors
     Returns the largest |row sum - goal| before balancing.
     Based on: Knight, The Sinkhorn-Knopp algorithm: convergence and applications, 2008.
     """
@@ -261,7 +269,7 @@ def sinkhorn_balance(first, column, value, goal, slack, factor, steps):
         for k in range(first[i], first[i + 1]):
             total += value[k]
         error = max(error, abs(total - goal[i]))
-    # Minimise along one coordinate after the other until the factors converge.
+    # Update all factors in turn, pass after pass, until the largest change of a factor is small.
     for _ in range(steps):
         most = 0.0
         for i in range(len(first) - 1):

@@ -1,9 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
 """Final gather: irradiance and ambient occlusion of texels from n cosine-weighted rays each.
 
-    E_indirect = pi / n sum M / pi        M: radiosity of the texel that was hit, without emission
+    E_indirect = pi / n sum M / pi  M: radiosity of the texel at the ray's hit, without emission
     E_sky      = pi / n sum L_sky         over rays that leave the scene, L_sky: radiance
-    E_emitted  = sum of MIS-weighted hits of emitters, where `area_light` did not use the closed form
+    E_emitted  = sum of MIS-weighted hits of emitters, if `area_light` did not use the closed form
     AO         = share of rays without a hit within a distance
 
 Based on: Reichert, A two-pass radiosity method driven by lights and viewer position, 1992;
@@ -65,18 +65,18 @@ def gather(
     origin, normal, lookup, seen, emitters, shading, buffers, begin, sobol_points, shared, sky, limits,
     analytic, out,
 ):  # fmt: skip
-    """Write the irradiance and ambient occlusion that hemisphere rays of texels find.
+    """Write the irradiance and ambient occlusion of m texels, estimated with hemisphere rays.
 
-    origin, normal : (m, 16, 3) float32, metres, world, and unit; points of m texels
+    origin, normal : (m, 16, 3) float32, metres and unit vectors, world; points of m texels
     lookup : TriangleLookup; seen : SeenLight, light that texels reflect
-    emitters : TileEmitters; shading : Shading or None, from `emitters.needed_shading`
+    emitters : TileEmitters; shading : Shading or None, from `kernels.emitters.needed_shading`
     buffers : PacketBuffers; begin : number of the first texel, which seeds the random numbers
-    sobol_points : (n, 2) uint32, one row per ray; shared : uint32, see `sampling`
+    sobol_points : (n, 2) uint32, one row per ray; shared : uint32, from `kernels.sampling.shared_bits_mask`
     sky : (3,) float32, radiance, cd/m2
-    limits : (2,) float64, AO distance in metres, and the number of shadow rays in the MIS weights
-    analytic : (m,) uint8, 1 for texels to which hits of emitters add nothing, except emitters of the separate
-        stratum (`TileEmitters.apart`)
-    out : (m, 8) float32 output, see the column names; irradiance in lx
+    limits : (2,) float64, AO distance in metres, and number of shadow rays for the MIS weights
+    analytic : (m,) uint8, 1 for texels to which hits of emitters add nothing; emitters of the separate
+        stratum (`TileEmitters.apart`) still add their light
+    out : (m, 8) float32 output, columns INDIRECT, DIRECT, OPEN and SQUARE; irradiance in lx
     """
     n_samples = len(sobol_points)
     scene, intersect, width = buffers.scene, buffers.intersect, buffers.width
@@ -100,7 +100,7 @@ def gather(
     hits, split = new_hits(), _counts()
     seeds, frame = new_seeds(), new_frame()
     distance = _f(limits[0])
-    # In the end all sums of light are multiplied by pi / n. Therefore reflected light is divided by pi, and
+    # At the end, all sums of light are multiplied by pi / n. Therefore radiosity is divided by pi here, and
     # the result of `emitter_hit` is multiplied by n / pi.
     inverse_pi = _f(1.0 / np.pi)
     lit = len(exitance) > 0
@@ -117,7 +117,7 @@ def gather(
         stopped = True
         for step in range(n_samples * turns):
             s, turn = step // turns, step % turns
-            # Start a batch with the next point of each texel.
+            # Start a batch of rays with the next point of each texel.
             k = s * N_POINTS // n_samples
             if turn == 0 and (s == 0 or k != (s - 1) * N_POINTS // n_samples):
                 load_frames(rays, frame, origin, normal, group, lanes, k)
@@ -125,15 +125,15 @@ def gather(
                     part[j] = _f(0.0)
                 for lane in range(PACKET_WIDTH):
                     missed[lane] = _f(0.0)
-            # Trace one ray of each texel. If no ray of turn 0 stops at a BLEND surface, turn 1 has the same
-            # hits.
+            # Trace one ray of each texel. `trace_gather` explains the two turns of scenes with BLEND
+            # surfaces. If no ray of turn 0 stops at a BLEND surface, turn 1 reuses the hits of turn 0.
             if turn == 0 or stopped:
                 aim_lanes(rays, words, frame, seeds, sobol_points[s, 0], sobol_points[s, 1], shared, FAR)
                 trace_gather(
                     buffers.blend, turn, intersect, scene, width, query, on, rays, words, spare_on, spare
                 )
             if turn == 0:
-                # Use the rays of turn 0 for AO. A BLEND surface stops them with probability alpha.
+                # Use the rays of turn 0 for AO: BLEND surfaces stop them with probability alpha.
                 opened = _f(1.0)
                 stopped = any_stopped(buffers.blend, words)
                 if not stopped:
@@ -150,7 +150,7 @@ def gather(
             opened = _f(0.0)
             _add_coloured_sky(buffers.blend, words, sky, missed, part)
             # Find the pixel of each hit, and add the light of emitters. A separate loop below reads the
-            # pixels, so that cache misses overlap.
+            # radiosity of the pixels, so that cache misses overlap.
             for lane in range(lanes):
                 pixel[lane] = -1
                 if words[GEOM_ID * PACKET_WIDTH + lane] == NO_HIT:
@@ -222,7 +222,7 @@ def gather(
                 if n_split > 0:
                     for lane in range(PACKET_WIDTH):
                         on[lane] = -1 if lane < lanes else 0
-            # End a batch: add the sky to its sums, and the sums to the totals.
+            # End a batch: add the sky to the sums of the batch, and these sums to the totals.
             if turn + 1 == turns and (s + 1) * N_POINTS // n_samples != k:
                 for lane in range(PACKET_WIDTH):
                     for c in range(3):
@@ -245,7 +245,7 @@ def gather(
 
 @inner
 def _add_coloured_sky(blend, words, sky, missed, part):
-    """Add the sky's light along rays through BLEND surfaces, and subtract these rays from `missed`.
+    """Add the sky's light along rays through BLEND surfaces, and do not count these rays in `missed`.
 
     blend : `PacketBuffers.blend`; words : (21 * 16,) uint32, the packet; sky : (3,) float32, cd/m2
     missed : (16,) float32, number of rays without a hit; part : (7 * 16,) float32, sums, see `gather`
@@ -269,13 +269,13 @@ def _add_coloured_sky(blend, words, sky, missed, part):
 def estimate_occlusion(origin, normal, buffers, begin, sobol_points, shared, distance, early_out, out):
     """Write the ambient occlusion of m texels (1 is unoccluded); return the number of rays cast.
 
-    origin, normal : (m, 16, 3) float32, metres, world, and unit; points of the texels
+    origin, normal : (m, 16, 3) float32, metres and unit vectors, world; points of the texels
     buffers : PacketBuffers, without transmittance
     begin : number of the first texel, which seeds the random numbers and is the index in `out`
-    sobol_points : (n, 2) uint32, one row per ray; shared : uint32, see `sampling`
+    sobol_points : (n, 2) uint32, one row per ray; shared : uint32, from `kernels.sampling.shared_bits_mask`
     distance : float32, length of the rays, metres
-    early_out : number of rays after which sixteen texels are finished if at most one ray of each was blocked;
-        0 disables this
+    early_out : number of rays per texel after which sixteen texels are finished, if at most one ray of each
+        texel was blocked; 0 disables the early out
     out : (n_entries,) float32 output; items begin to begin + m - 1 are written
     """
     n_samples = len(sobol_points)

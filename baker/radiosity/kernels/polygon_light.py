@@ -3,9 +3,13 @@
 
     E = L / 2 |sum_i angle_i Gamma_i . n|
 
-The sum is over the edges i of the part of the triangle above the point's tangent plane. n is the unit normal
-of that plane and L the radiance. angle_i is the angle that edge i subtends at the point. Gamma_i is the unit
-normal of the plane through the point and the edge. With a, b the vectors from the point to the edge's ends,
+The triangle is clipped to the half space above the tangent plane of the receiving point. The sum is over the
+edges i
+of the clipped polygon. n is the unit normal at the point, and L the radiance. angle_i is the angle that edge
+i subtends
+at the point. Gamma_i is the unit normal of the plane through the point and the edge. If a and b are the
+vectors from
+the point to the edge's ends,
 
     angle Gamma = angle / sin(angle) (a x b) / (|a| |b|)
 
@@ -30,20 +34,21 @@ _f = np.float32
 #     _ORIGIN, _NORMAL   position and normal of the point (3 each)
 #     _ARM               vectors from the point to up to four corners (12)
 #     _HEIGHT            heights of the triangle's three corners above the tangent plane (3)
-#     _SUM               sum over the edges
+#  _SUM                 sum over the edges of angle_i Gamma_i . n
 #     _SMALL             E / L of a triangle that is treated as a point, -1 for other triangles
 #     _FACING            1 if a side that emits faces the point, else 0
 _ORIGIN, _NORMAL, _ARM, _HEIGHT, _SUM, _SMALL, _FACING = 0, 3, 6, 18, 21, 22, 23
 _ROWS = 24
 _work, _corners = scratch((_ROWS * PACKET_WIDTH,), _f), scratch((15,), _f)
-# (longest edge / distance)^2 below which a triangle is treated as a point at its centroid, because the sum
-# over edges would lose digits. The relative error of this approximation is about 1e-5.
+# (longest edge / distance)^2 of a triangle. Below it, the triangle is treated as a point at its centroid,
+# because the
+# sum over edges would lose digits. The relative error of this approximation is about 1e-5.
 _SMALL_VIEW = np.float32(1.0e-4)
 
 
 @inner
 def angle_over_sine(x, sine):
-    """Return angle / sin(angle) from the cosine x in [-1, 1] and the sine; relative error below 1e-6.
+    """Return angle / sin(angle) from the angle's cosine x in [-1, 1] and sine; relative error below 1e-6.
 
     The sine is an argument, because near 180 degrees the float32 cosine does not determine it accurately.
     """
@@ -69,10 +74,10 @@ def angle_over_sine(x, sine):
 def unoccluded_irradiance(origin, normal, group, lanes, row, found):
     """Write the unoccluded irradiance of up to sixteen texels from all emitters.
 
-    origin, normal : (m, 16, 3) float32, metres, world, and unit
+    origin, normal : (m, 16, 3) float32, metres and unit vectors, world
     group, lanes : first texel and number of texels to compute
-    row : (M, 24) float32, see `emitters`; untextured emitters only
-    found : (3 * 16,) float32 output, lx; R, G, B (16 lanes each), means over each texel's points
+    row : (M, 24) float32, see `kernels.emitters.Emitters`; untextured emitters only
+    found : (3 * 16,) float32 output, lx, by colour and lane; means over each texel's 16 points
     """
     work = _work()
     for j in range(3 * PACKET_WIDTH):
@@ -101,7 +106,7 @@ def unoccluded_irradiance(origin, normal, group, lanes, row, found):
 
 @pasted
 def _load_corner(work, j, x, y, z):
-    """Write the vectors from all lanes' points to corner j at (x, y, z), and its heights above their planes.
+    """Write the vector from each lane's point to corner j at (x, y, z), and the corner's height.
 
     work : (24 * 16,) float32, see the row names
     """
@@ -116,10 +121,10 @@ def _load_corner(work, j, x, y, z):
 
 @inner
 def _load_triangle(work, row, m, lanes):
-    """Write the corners of the part of triangle m above each point's tangent plane.
+    """Write the corners of triangle m, clipped to the half space above each point's tangent plane.
 
-    work : (24 * 16,) float32, see the row names; row : (M, 24) float32, see `emitters`
-    Returns the largest number of corners of any lane, 3 or 4; 0 if the triangle emits towards no lane.
+    work : (24 * 16,) float32, see the row names; row : (M, 24) float32, see `kernels.emitters.Emitters`
+    Returns the largest number of corners of any lane, 3 or 4; 0 if the triangle lights no lane's point.
     """
     # Load the corners. The values are arguments and j is a constant, so that the compiler vectorises the
     # loops over lanes.
@@ -183,7 +188,7 @@ def _load_triangle(work, row, m, lanes):
 
 @inner
 def _clip(work, lane):
-    """Clip a lane's triangle to the half space above its tangent plane: three or four corners remain.
+    """Clip a lane's triangle to the half space above the tangent plane: three or four corners remain.
 
     work : (24 * 16,) float32, see the row names
     """

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Regions of charts: connected components of the graph whose edges link neighbouring texels."""
+"""Regions of charts: connected components of the graph that links neighbouring texels (`radiosity.sides`)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ def join_linked(link, root):
 
 @kernel
 def flood_regions(chart, region, queue):
-    """Assign to each texel without a region the region of the nearest texel of its chart (breadth-first).
+    """Assign to each texel without a region the region of the nearest texel of its chart.
+    Distances are numbers of steps between texels that share an edge, within the chart.
 
     chart : (H, W) int32, chart of each texel of a page, -1 for empty texels
     region : (H, W) int32, -1 for texels without a region, which are filled in
@@ -62,12 +63,13 @@ def flood_regions(chart, region, queue):
 
 @kernel
 def neighbour_pairs(pixel, back, chart, lookup, back_entry, size, chosen, both, pair):
-    """Write the pairs of entries of one chart whose texels share an edge: two fronts, or two backs.
+    """Write pairs of entries of one chart whose texels share an edge. Both are fronts, or both are backs.
 
     pixel (n,) int64, back (n,) bool, chart (n,) int32 : see `TexelBuffer`
     lookup (P * H * W,) int32, back_entry (n_front,) int32 : see `TexelBuffer`
     size : int, width and height of a page, texels
-    chosen : (n,) bool; both : bool, whether both entries of a pair must be chosen, else one
+    chosen : (n,) bool
+    both : bool, if True, both entries of a pair are chosen, else at least one
     pair : (2 n, 2) int32 output, entries
     Returns the number of pairs.
     """

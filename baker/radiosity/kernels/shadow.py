@@ -19,15 +19,15 @@ MAX_DISTANCE = 3
 def add_visible(buffers, origin, ray, weight, colour, out):
     """Add the irradiance of texels from one light to both RGB estimates in `out`.
 
-        irradiance = colour * mean over the texel's 16 points of weight * visibility
+        irradiance = colour * mean(weight * visibility)
 
-    The visibility of a blocked ray is 0. Otherwise it is the RGB transmittance of the BLEND surfaces that the
-    ray crosses.
+    The mean is over the texel's 16 points. The visibility of a blocked ray is 0. Otherwise it is the RGB
+    transmittance of the BLEND surfaces that the ray crosses.
 
     buffers : PacketBuffers; origin : (n, 16, 3) float32, metres, world
     ray : (n, 16, 4) float32, direction, and TFAR in units of the direction's length (MAX_DISTANCE)
     weight : (n, 16) float32, unoccluded irradiance for an intensity of 1; no ray is cast where it is 0
-    colour : (3,) float32, intensity of the light; out : (n, 6) float32, lx, RGB twice, added to
+    colour : (3,) float32, intensity of the light; out : (n, 6) float32, lx, two RGB estimates, added to
     """
     scene, occluded, width = buffers.scene, buffers.occluded, buffers.width
     query = buffers.query

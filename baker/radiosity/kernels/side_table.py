@@ -1,9 +1,11 @@
 # mypy: disable-error-code="no-untyped-def"
 """The table of split texels, and the search for the side of a split texel on which a hit lies.
 
-Each point of a split texel belongs to one side. A hit gets the side of the nearest point that is visible from
-a position on the ray shortly before the hit. If no point is visible from there, the position is just above
-the hit. See `sides` for the height of the segments that test visibility.
+Another surface divides a split texel into sides, and each of the texel's 16 points lies on one side
+(`radiosity.sides`). A hit gets the side of the nearest point that is visible from a position on the ray
+shortly
+before the hit. If no point is visible from there, visibility is tested from just above the hit.
+`radiosity.kernels.sides` defines the height of the segments that test visibility.
 """
 
 from __future__ import annotations
@@ -31,12 +33,13 @@ from baker.trace.packets import (
 )  # fmt: skip
 
 _f = np.float32
-# Start of a segment: distance from the hit back along the ray, or height above the hit, in texel sides.
+# Start of a segment, in texel sides: _BACK before the hit on the ray, or _ABOVE above the hit along the face
+# normal.
 _BACK, _ABOVE = 0.25, 0.02
 # Rows of `hits` for `find_side`: ray origin (3), direction (3), distance (1), normal of the hit face (3).
 HIT_ORIGIN, HIT_DIRECTION, HIT_DISTANCE, HIT_NORMAL = 0, 3, 6, 7
 HIT_ROWS = 10
-# Column of `SeenLight.image` after RGB: 1 + row of a split texel in the `SideTable`, else 0.
+# Column of `SeenLight.image` after RGB. For a split texel, 1 + its row in the `SideTable`; else 0.
 SIDE_ROW = 3
 # Working memory of the kernels.
 new_hits, _saved = scratch((HIT_ROWS * PACKET_WIDTH,), np.float32), scratch((3 * PACKET_WIDTH,), np.float32)
@@ -45,15 +48,15 @@ new_hits, _saved = scratch((HIT_ROWS * PACKET_WIDTH,), np.float32), scratch((3 *
 class SideTable(NamedTuple):
     """The S split texel entries and their points.
 
-    An entry with a single side is included if a corner of its surface is not visible from any of its points.
-    A hit near such a corner contributes no light.
+    An entry with a single side is included if none of its points sees a certain corner of its surface. A hit
+    near that corner then contributes no light.
 
     Attributes
     ----------
     point, normal : (S, 16, 3) float32
-        Ray origins, metres, world, and unit shading normals.
+        Ray origins, metres and unit vectors, world shading normals.
     height : (S, 16) float32
-        Height of segments from each point, metres, see `sides`.
+        Height of segments from each point, metres, see `radiosity.kernels.sides`.
     member : (S, 16) int32
         Row of each point's side in `SeenLight.value` or `SeenPatch.value`, -1 for points inside geometry.
     side : (S,) float32
@@ -84,10 +87,10 @@ class SeenLight(NamedTuple):
     Attributes
     ----------
     image : (P * H * W, 4) or (2 * P * H * W, 4) float32
-        Radiosity in lx (RGB) of the front of each pixel, then of the back. Column SIDE_ROW is 1 + row of the
-        texel in `sides`, 0 if it is not split. (0, 4) if nothing reflects.
+        RGB radiosity, lx: first of the fronts of all pixels, then, if there are backs, of the backs. Column
+        SIDE_ROW is 1 + row of the texel in `sides`, 0 if it is not split. (0, 4) if nothing reflects.
     value : (K, 4) float32
-        Radiosity in lx (RGB) of each side of the split texels. SIDE_ROW is unused.
+        RGB radiosity, lx, of each side of the split texels. Column SIDE_ROW is unused.
     sides : SideTable
         The split texels.
     """
@@ -98,7 +101,7 @@ class SeenLight(NamedTuple):
 
 
 def nothing_seen() -> SeenLight:
-    """Return the light of a scene in which no texel reflects any.
+    """Return the table of a scene in which no texel reflects light.
 
     Returns
     -------
@@ -109,13 +112,13 @@ def nothing_seen() -> SeenLight:
 
 
 class SeenPatch(NamedTuple):
-    """Patches of texels, which form-factor rays read at their hits.
+    """The patch of each texel, which form-factor rays read at their hits.
 
     Attributes
     ----------
     image : (P * H * W,) or (2 * P * H * W,) int32
-        Patch of the front of each pixel, then of the back; -1 for none. For a split texel in row s of
-        `sides`, `form_factor.SPLIT` - s.
+        First the patches of the fronts of all pixels, then, if there are backs, of the backs; -1 for none.
+        For a split texel in row s of `sides`, `form_factor.SPLIT` - s.
     value : (K,) int32
         Patch of each side of the split texels.
     sides : SideTable
@@ -149,7 +152,7 @@ def segment(rays, lane, x, y, z, tx, ty, tz):
 def note_hit(hits, lane, rays, row, prim, front):
     """Copy the hit of a lane to `hits`, from which `find_side` reads it.
 
-    hits : (10 * 16,) float32 output, see the row names; rays : (21 * 16,) float32, the packet
+    hits : (10 * 16,) float32 output, rows HIT_ORIGIN to HIT_NORMAL; rays : (21 * 16,) float32, the packet
     row : (T, 16) float32, see `TriangleLookup`; prim : triangle that was hit
     front : whether the ray hit the front of the triangle
     """
@@ -163,7 +166,7 @@ def note_hit(hits, lane, rays, row, prim, front):
 
 @inner
 def find_side(point, normal, height, member, side, s, hits, lane, buffers):
-    """Return the item of `member` for the side of split texel s on which a hit lies, -1 if none is found.
+    """Return the item of `member` for the side of split texel s that was hit, -1 if none is found.
 
     point, normal (S, 16, 3), height (S, 16), member (S, 16), side (S,) : see `SideTable`
     hits : (10 * 16,) float32, from `note_hit`; lane : lane of the hit
@@ -185,8 +188,8 @@ def find_side(point, normal, height, member, side, s, hits, lane, buffers):
     z = hits[(HIT_ORIGIN + 2) * PACKET_WIDTH + lane] + distance * dz
     found = np.int32(-1)
     for turn in range(2):
-        # Start on the ray before the hit, because rounding may place the hit on the other side. If no point
-        # is visible from there, start above the hit.
+        # Start on the ray before the hit, because rounding may place the hit behind the surface that divides
+        # the texel. If no point is visible from there, start above the hit.
         step = smaller(_f(_BACK) * side[s], _f(0.5) * distance)
         vx, vy, vz = -dx, -dy, -dz
         if turn == 1:

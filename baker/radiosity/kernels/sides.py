@@ -2,14 +2,18 @@
 """Texels with points on both sides of another surface that passes through them.
 
 For example, a floor that continues under a wall has texels with points on both sides of the wall. Two points
-of a texel are on the same side if the segment between them is not blocked. Both ends are raised along the
-normals:
+of a
+texel are on the same side if a segment between them is not blocked. The ends of the segment are raised along
+the
+normals of the points by
 
     height = min(HIGH s, headroom / 2)        s: side of the texel, metres
 
-The headroom of a point is the free distance along its normal. Both ends are raised by the smaller of their
-heights. So a step lower than this height does not separate two points, and an opening lower than this height
-does not connect them. The same test finds the side of a ray's hit (`side_table`).
+The headroom of a point is the free distance along its normal. Both ends are raised by the smaller of the two
+points'
+heights. So a step lower than that height does not separate two points, and an opening lower than that height
+does not
+connect them. The same test finds the side on which a ray's hit lies (`radiosity.kernels.side_table`).
 """
 
 from __future__ import annotations
@@ -38,12 +42,14 @@ from baker.trace.packets import (
 )  # fmt: skip
 
 _f = np.float32
-# Heights of segments above the surface, in texel sides.
+# Heights of segments above the surface, in texel sides. Segments between points are at most at HIGH.
 HIGH, LOW = 0.25, 0.02
-# Half length of the test segments along the diagonals, as a share of the texel's diagonal. They extend
-# slightly beyond the texel, so that a surface exactly between two texels is found in both.
+# Half length of the test segments along the diagonals, as a share of the texel's diagonal. More than 0.5, so
+# that a
+# surface exactly between two texels is found in both.
 _HALF_DIAGONAL = 0.55
-# Distance of a tested corner from the polygon's centroid, as a share of the true corner's distance.
+# Distance of a tested corner from the mean of the polygon's corners, as a share of the true corner's
+# distance.
 _CORNER = 0.998
 # Rows of `frame` (3 each): centre, both half diagonals, and the normal times the texel's side.
 _CENTRE, _DIAGONAL_1, _DIAGONAL_2, _NORMAL = 0, 3, 6, 9
@@ -54,11 +60,12 @@ _frame = scratch((12 * PACKET_WIDTH,), np.float32)
 
 @kernel
 def crossed_texels(surface, begin, end, buffers, crossed, side):
-    """Find texels that another surface may pass through, with segments just above the texel's square.
+    """Find the texels that another surface may pass through, with segments just above each texel's square.
 
     surface : Surface; begin, end : first entry and end of the tested entries; buffers : PacketBuffers
-    crossed : (n,) uint8 output, 1 if a diagonal is blocked at height HIGH or LOW, or an edge at height HIGH
-    side : (n,) float32 output, metres, root mean square of width and height of the whole texel
+    crossed : (n,) uint8 output, 1 if a diagonal of the square is blocked at height HIGH or LOW, or an edge of
+        the square at height HIGH
+    side : (n,) float32 output, metres, root mean square of the texel's width and height
     Returns the number of rays cast.
     """
     position, uv, triangle, face = surface.position, surface.uv, surface.triangle, surface.face_normal
@@ -157,9 +164,9 @@ def _between(rays, lane, origin, normal, height, m, i, k):
 
 @kernel
 def point_heights(origin, normal, side, buffers, height):
-    """Write the height of segments from each point, see the module.
+    """Write the height of segments from each point, as the module defines it.
 
-    origin, normal : (n, 3) float32, metres, world, and unit
+    origin, normal : (n, 3) float32, metres and unit vectors, world
     side : (n,) float32, metres, side length of each point's texel
     buffers : PacketBuffers; height : (n,) float32 output, metres
     """
@@ -186,7 +193,7 @@ def point_heights(origin, normal, side, buffers, height):
 def group_points(origin, normal, height, valid_points, buffers, label):
     """Group the points of texels by mutual visibility; return the number of rays cast.
 
-    origin, normal : (m, 16, 3) float32, metres, world, and unit
+    origin, normal : (m, 16, 3) float32, metres and unit vectors, world
     height : (m, 16) float32, metres, from `point_heights`
     valid_points : (m,) uint16, bit k is set where point k is not inside geometry
     buffers : PacketBuffers
@@ -229,7 +236,7 @@ def group_points(origin, normal, height, valid_points, buffers, label):
                 if other < 0:
                     label[m, k] = own
                     continue
-                # Merge both groups, because a point of an earlier group is visible from the seed.
+                # Merge the earlier group with this one, because one of its points is visible from the seed.
                 for j in range(N_POINTS):
                     label[m, j] = own if label[m, j] == other else label[m, j]
         # Number the remaining groups from 0.
@@ -246,14 +253,13 @@ def group_points(origin, normal, height, valid_points, buffers, label):
 
 @kernel
 def hidden_corners(surface, chosen, origin, normal, height, valid_points, side, buffers, hidden):
-    """Find texels with a corner that none of their points sees, or with a blocked outline.
-
-    Corners are the corners of the part of each triangle inside the texel. Another surface may cut off a
-    corner that contains no point but that rays may hit. The edge between two walls may enter a texel through
-    one of its sides. It then blocks the segment between the corners of that side, a part of the outline.
+    """Find texels with a corner that is visible from none of their points, or with a blocked outline.
+    Each triangle is clipped to the texel's square; the corners and the outline are those of the clipped
+    polygons. Another surface may cut off a corner that contains no point but that rays may hit. The edge
+    between two walls may cross one edge of the polygon. It then blocks the outline between two corners.
 
     surface : Surface; chosen : (m,) int64, texel entries
-    origin, normal : (m, 16, 3) float32, metres, world, and unit; height : (m, 16) float32, metres
+    origin, normal : (m, 16, 3) float32, metres and unit vectors, world; height : (m, 16) float32, metres
     valid_points : (m,) uint16, see `group_points`; side : (m,) float32, metres
     buffers : PacketBuffers; hidden : (m,) uint8 output, 1 for these texels
     Returns the number of rays cast.
@@ -431,7 +437,7 @@ def _trace_corners(
 def free_segments(origin_a, normal_a, height_a, origin_b, normal_b, height_b, buffers, free):
     """Test the mutual visibility of n pairs of points a and b.
 
-    origin_a, normal_a, origin_b, normal_b : (n, 3) float32, metres, world, and unit
+    origin_a, normal_a, origin_b, normal_b : (n, 3) float32, metres and unit vectors, world
     height_a, height_b : (n,) float32, metres, from `point_heights`; the lower height of a pair is used
     buffers : PacketBuffers; free : (n,) uint8 output, 1 if the segment is not blocked
     """
@@ -459,10 +465,12 @@ def free_segments(origin_a, normal_a, height_a, origin_b, normal_b, height_b, bu
 
 @kernel
 def count_backs(origin, normal, lookup, buffers, sobol_points, shared, count):
-    """Cast one ray from each of a texel's 16 points; count the first hits on backs of one-sided surfaces.
+    """Cast one ray from each of a texel's 16 points; count the rays that first hit a black back.
+    A black back is the back of a one-sided surface.
 
-    origin, normal : (m, 16, 3) float32, metres, world, and unit; lookup : TriangleLookup
-    buffers : PacketBuffers; sobol_points : (16, 2) uint32; shared : uint32, see `sampling`
+    origin, normal : (m, 16, 3) float32, metres and unit vectors, world; lookup : TriangleLookup
+    buffers : PacketBuffers; sobol_points : (16, 2) uint32
+    shared : uint32, from `kernels.sampling.shared_bits_mask`
     count : (m,) int32 output, 0 on entry
     """
     scene, intersect, width, query = buffers.scene, buffers.intersect, buffers.width, buffers.query

@@ -1,8 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Conservative rasterisation of charts: finds the triangles that each texel's square touches.
-
-A first pass counts the triangles of each texel. A second pass writes them, with their areas inside the
-texel's square. Each texel then keeps only the triangles of the chart with the largest area in it.
+"""Conservative rasterisation of charts: finds the triangles that touch each texel's square.
+A first pass counts the triangles of each texel. A second pass writes the triangles, with their areas inside
+the
+texel's square. Then each texel keeps the triangles of one chart: the chart with the largest area in the
+texel.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from baker.trace.jit import inner, kernel, larger, smaller
 
 @inner
 def _corners(uv, triangle, t, size, corner):
-    """Write the corners of triangle t in texels; return the first x, first y, last x, last y of its texels.
+    """Write the corners of triangle t in texels; return the range of its texels.
+    Returns the first x, first y, last x and last y, inclusive.
 
     uv : (V, 2) float32; triangle : (T, 3) int32; size : int, width and height of a page, texels
     corner : (3, 2) float64 output
@@ -32,7 +34,8 @@ def _corners(uv, triangle, t, size, corner):
         corner[i, 1] = y
         low_x, high_x = smaller(low_x, x), larger(high_x, x)
         low_y, high_y = smaller(low_y, y), larger(high_y, y)
-    # Shrink the range, so that a border exactly between two texels does not touch the outer texel.
+    # Shrink the range, so that a triangle that ends exactly between two texels does not touch the outer
+    # texel.
     tiny = 1.0e-4
     first_x = larger(math.floor(low_x + tiny), 0)
     first_y = larger(math.floor(low_y + tiny), 0)
@@ -43,13 +46,13 @@ def _corners(uv, triangle, t, size, corner):
 
 @kernel
 def list_overlaps(uv, triangle, page, size, at, entry, area):
-    """Write the triangles that each texel's square touches, ascending, and their areas in the square.
+    """Write the triangles that touch each texel's square, ascending, and their areas in the square.
 
     uv : (V, 2) float32; triangle : (T, 3) int32; page : (T,) int32
     size : int, width and height of a page, texels
     at : (P * H * W,) int64, index at which the next triangle of each texel is written; increased by one for
         each triangle
-    entry : (m,) int32 output, triangles; with shape (0,), triangles are only counted
+    entry : (m,) int32 output, triangles; with shape (0,), only `at` is changed
     area : (m,) float32 output, texels
     """
     corner, cut, spare = new_triangle(), new_polygon(), new_polygon()
@@ -79,7 +82,7 @@ def keep_main_chart(first, entry, area, chart, texel_chart, kept):
     entry : (m,) int32, triangles; area : (m,) float32, their areas in the texel, texels
     chart : (T,) int32, chart of each triangle
     texel_chart : (n,) int32 output, chart of each texel
-    kept : (m,) bool output, set for the items of `entry` in that chart
+    kept : (m,) bool output, set for the items of `entry` that are triangles of the texel's chart
     If no triangle of the chart has area in the texel, one triangle is marked. Otherwise triangles without
     area in the texel are not marked.
     """
