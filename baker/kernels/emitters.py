@@ -181,6 +181,7 @@ def bounding_sphere(origin):  # type: ignore[no-untyped-def]
 @kernel
 def widest_view(emitters, origin):  # type: ignore[no-untyped-def]
     """Return the largest radius / distance of all clusters, as seen from points.
+
     The distance is from the cluster's centre to the bounding sphere of the points. If that bounding sphere
     touches the sphere of a cluster, inf is returned.
 

@@ -66,6 +66,7 @@ def scramble_reversed(x, seed):  # type: ignore[no-untyped-def]
 @inner
 def texel_scramble(shared_reversed, seed, mask):  # type: ignore[no-untyped-def]
     """Return a float32 in [0, 1): a Sobol number with its unshared bits scrambled by the texel's seed.
+
     shared_reversed : uint32, Sobol number from `sobol_reversed`: all its bits are already scrambled in the
         same way for all texels; bit-reversed
     seed : uint32, seed of the texel

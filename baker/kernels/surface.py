@@ -236,6 +236,7 @@ def load_flat(position, shading, face, triangle, t, sign, row):
 @inner
 def place_flat_point(row, min_offset_scale, b1, b2, origin, normal, n, k):
     """Write the ray origin and the normal of a point of a flat triangle, as `place_point` does.
+
     The point must not be near the border of the triangle.
 
 

@@ -115,6 +115,7 @@ def start_at_eye(path, row, lane, where, toward, normal, camera, n_subpaths, siz
 @inner
 def scatter_both(path, row, lane, eye, choice, u, w, value, spare):
     """Sample the next direction of a subpath, and update its throughput and MIS sums.
+
     Returns False if the subpath ends.
 
     path : (N_ROWS_BOTH, n) float64; row : (5, n) float64; eye : whether the subpath started at the eye

@@ -220,6 +220,7 @@ def fade(path, lane, distance, inverse_range):
 @inner
 def start_on_disc(path, lane, sphere, dx, dy, dz, u, w):
     """Write the start of a light subpath of direction d: a uniform point on a disc in front of the scene.
+
     The disc is perpendicular to d and touches the scene's bounding sphere.
 
 

@@ -237,7 +237,7 @@ class EmitterChooser:
         return asked, seen
 
     def _weights(self, all_emitters: TileEmitters, origin: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Return (C,) float64: power / distance^2 of each cluster; 0 if the cluster faces away from all
+        """Return (C,) float64: power / distance^2 of each cluster; 0 for clusters that face away from the
         points.
 
         origin : (m, w, 3) float32, metres, world; distances are from the centre of the points' bounding box

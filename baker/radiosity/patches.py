@@ -123,8 +123,7 @@ def build_patches(
 def _smallest_block(
     texels: TexelBuffer, level: NDArray[np.uint8], chosen: NDArray[np.int64], max_patches: int
 ) -> int:
-    """Return the smallest side of blocks, texels, for which the chosen entries form at most `max_patches`
-    blocks.
+    """Return the smallest side of blocks, texels, that gives at most `max_patches` blocks of chosen entries.
 
     chosen : (m,) int64, entries
     """

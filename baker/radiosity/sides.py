@@ -423,6 +423,7 @@ def _order_sides(
     entries: _Entries, groups: _Groups, root: NDArray[np.int32], backs: NDArray[np.float64]
 ) -> tuple[NDArray[np.int32], SideTable, NDArray[np.int32]]:
     """Choose the side that gets a split texel's original entry: the side with the largest weight of points.
+
     If many rays of a side hit backs of one-sided surfaces, its points have a smaller weight. Such a side
     lies, for example, outside a room with one-sided walls, or under a one-sided floor. A side whose region
     contains no unsplit texel is chosen only if this is true of all sides of the texel. An example of such a

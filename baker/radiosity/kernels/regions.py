@@ -33,6 +33,7 @@ def join_linked(link, root):
 @kernel
 def flood_regions(chart, region, queue):
     """Assign to each texel without a region the region of the nearest texel of its chart.
+
     Distances are numbers of steps between texels that share an edge, within the chart.
 
     chart : (H, W) int32, chart of each texel of a page, -1 for empty texels

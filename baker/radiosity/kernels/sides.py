@@ -254,6 +254,7 @@ def group_points(origin, normal, height, valid_points, buffers, label):
 @kernel
 def hidden_corners(surface, chosen, origin, normal, height, valid_points, side, buffers, hidden):
     """Find texels with a corner that is visible from none of their points, or with a blocked outline.
+
     Each triangle is clipped to the texel's square; the corners and the outline are those of the clipped
     polygons. Another surface may cut off a corner that contains no point but that rays may hit. The edge
     between two walls may cross one edge of the polygon. It then blocks the outline between two corners.
@@ -466,6 +467,7 @@ def free_segments(origin_a, normal_a, height_a, origin_b, normal_b, height_b, bu
 @kernel
 def count_backs(origin, normal, lookup, buffers, sobol_points, shared, count):
     """Cast one ray from each of a texel's 16 points; count the rays that first hit a black back.
+
     A black back is the back of a one-sided surface.
 
     origin, normal : (m, 16, 3) float32, metres and unit vectors, world; lookup : TriangleLookup

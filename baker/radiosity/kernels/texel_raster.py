@@ -1,5 +1,6 @@
 # mypy: disable-error-code="no-untyped-def"
 """Conservative rasterisation of charts: finds the triangles that touch each texel's square.
+
 A first pass counts the triangles of each texel. A second pass writes the triangles, with their areas inside
 the
 texel's square. Then each texel keeps the triangles of one chart: the chart with the largest area in the
@@ -20,6 +21,7 @@ from baker.trace.jit import inner, kernel, larger, smaller
 @inner
 def _corners(uv, triangle, t, size, corner):
     """Write the corners of triangle t in texels; return the range of its texels.
+
     Returns the first x, first y, last x and last y, inclusive.
 
     uv : (V, 2) float32; triangle : (T, 3) int32; size : int, width and height of a page, texels
