@@ -16,7 +16,7 @@ PLASTER, CONCRETE, WOOD, BLACK = (0.7, 0.7, 0.68), (0.45, 0.45, 0.45), (0.45, 0.
 
 @dataclass
 class Level:
-    """A scene, and the sky, which a glTF file cannot contain.
+    """A game level: a scene and its sky, which a glTF file cannot contain.
 
     Attributes
     ----------

@@ -1,6 +1,6 @@
-"""Makes levels as designers build them, with parts that intersect, to test whether their light is correct.
+"""Makes game levels as designers build them, with parts that intersect, for tests of their light.
 
-    python assets/make_levels.py            writes the levels whose light is known to assets/levels
+    python assets/make_levels.py            writes the levels of `KEPT` to the folder assets/levels
     python assets/make_levels.py FOLDER     writes all levels to FOLDER
 
 The radiance of each level's sky is written to levels.json in the same folder. The output is deterministic.
@@ -40,6 +40,7 @@ LEVELS: dict[str, Callable[[], Level]] = {
     "cellar": indoors.make_cellar,
     "centimetres": indoors.make_centimetres,
 }
+# Levels in the repository. `tests/e2e/test_levels.py` knows their light at some points.
 KEPT = ("closed", "garage", "street", "tunnel", "warehouse")
 
 

@@ -37,8 +37,8 @@ HERE = Path(__file__).resolve().parent
 class Row:
     """The results of one program with one setting.
 
-    `seconds` and `bake_seconds` have one entry for each turn: the time of the whole process and of the bake
-    alone. `error` is that of the last turn.
+    Each setting is baked `--repeat` times. `seconds` is the time of the whole process of each bake, and
+    `bake_seconds` the time of the bake alone. `error` is the error of the last bake.
     """
 
     program: str

@@ -71,7 +71,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def measure(path: Path, spp: int, repeat: int) -> dict[str, Any]:
-    """Return the rates of each turn, in million rays per second, and the mean results of both programs."""
+    """Return rates in million rays per second, one of each repetition, and mean results of both programs."""
     from mitsuba_scene import flat, mitsuba_camera, mitsuba_scene
 
     threads = thread_count(None)

@@ -12,7 +12,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-# Time between two measurements of the memory of all processes of a bake, seconds.
+# Interval at which the memory of all processes of a bake is measured, seconds.
 _LOOK = 0.05
 
 

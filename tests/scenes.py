@@ -23,7 +23,10 @@ GAP = 2
 
 @dataclass(frozen=True)
 class Quad:
-    """A parallelogram covered by whole texels: columns run along `u`, rows along `v`."""
+    """A parallelogram covered by whole texels: columns run along `u`, rows along `v`.
+
+    `texels` is the number of columns and of rows. The first texel is at (`row`, `column`) of the page.
+    """
 
     origin: np.ndarray
     u: np.ndarray
@@ -129,15 +132,14 @@ class SceneBuilder:
             for side in (0, 1):
                 origin = low.copy()
                 origin[axis] = (low, high)[side][axis]
-                # u x v is the positive axis: the front of the far side of a solid, and of the near side of a
-                # room.
+                # u x v points along the positive axis. The sides whose front points the other way use v x u.
                 forth = (side == 1) != inward
                 u, v = edges if forth else edges[::-1]
                 found["-+"[side] + letter] = self.quad(origin, u, v, material, (texels, texels))
         return found
 
     def triangles(self, corner: np.ndarray, material: int, texels: int = 4, normal: Any = None) -> None:
-        """Add (T, 3, 3) triangles as one object, a chart for each; `normal` (T, 3, 3), default flat."""
+        """Add triangles (T, 3, 3) as an object, one chart each. The default normals are face normals."""
         n = len(corner)
         uv = np.zeros((n, 3, 2))
         for t in range(n):
@@ -153,7 +155,10 @@ class SceneBuilder:
         )  # fmt: skip
 
     def sheet(self, point: np.ndarray, material: int, texels: tuple[float, float]) -> None:
-        """Add a flat-shaded grid of points (rows, columns, 3) as one chart, fronts towards column x row."""
+        """Add a flat-shaded grid of points (rows, columns, 3) as one chart.
+
+        The fronts face the cross product of the directions along rows and along columns.
+        """
         rows, columns = point.shape[:2]
         x, y = self._cell(*(int(np.ceil(t)) for t in texels))
         r, c = (a.reshape(-1) for a in np.indices((rows - 1, columns - 1)))

@@ -220,7 +220,7 @@ def stage_literals(tree):
             found += [node.value, *getattr(node.value, "elts", [])]
         elif isinstance(node, ast.List | ast.Tuple | ast.Set | ast.Dict):
             parts = node.keys if isinstance(node, ast.Dict) else node.elts
-            # Lists of stages. A single name of a stage may be another kind of key.
+            # A list with several names of stages. A single name may be another kind of key.
             if len(parts) > 1 and all(part is not None and text(part) in stages for part in parts):
                 found += parts
         elif text(node) in stages and " " in node.value and node.value != Stage.AMBIENT_OCCLUSION:

@@ -1,4 +1,4 @@
-"""Docs pages: required pages and sections exist, and all relative links have targets."""
+"""Required docs pages and sections exist, and all relative links in docs pages have targets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Kernels are in the right packages, and each package lists the files from which its kernels are compiled."""
+"""Kernels are in the right packages, and each package lists the packages whose kernels it compiles in."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def imports(texts):
 
 
 def test_packages_name_what_their_kernels_are_made_of(texts, imports):
-    """Otherwise, after a change of one package, cached kernels of another package would be outdated."""
+    """If a package did not list one, its cached kernels would be outdated after a change of that package."""
     kernels = {name for name, text in texts.items() if KERNEL.search(text)}
     assert {
         "baker.radiosity.kernels.gather",

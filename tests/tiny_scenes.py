@@ -35,7 +35,7 @@ class Quad:
 
 @dataclass(frozen=True)
 class World:
-    """The data that `baker.pipeline.prepare.prepare_scene` makes, without invalid points and sides."""
+    """The data of a `PreparedScene`, without searches for invalid points and split texels."""
 
     scene: Any
     atlas: Any
@@ -69,7 +69,7 @@ class World:
 
 
 def seen_patches(texels, patch):
-    """Return the patch lookup for hits, in a scene without split texels."""
+    """Return the patch lookup for hits, in a scene without split texels (see `baker.radiosity.sides`)."""
     return SeenPatch(texels.hit_image(patch, -1), np.zeros(0, np.int32), no_sides())
 
 

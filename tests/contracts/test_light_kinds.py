@@ -179,7 +179,7 @@ def test_a_kind_added_by_one_file_is_taken_by_all(tmp_path, add_kind):
 
 
 def test_a_kind_with_a_fall_off_of_its_own_is_taken_by_all(tmp_path, add_kind):
-    """The bake uses the kernel of the kind, the path tracer its table, and `verify` finds them equal."""
+    """The bake evaluates the kernel of the kind, the path tracer its table. `verify` finds no difference."""
     add_kind("beacon", BEACON)
     out = tmp_path / "out"
     light = replace(shining("beacon", 100.0), parameters={"sharpness": 3.0})
@@ -202,7 +202,7 @@ def test_a_kind_with_a_fall_off_of_its_own_is_taken_by_all(tmp_path, add_kind):
 
 
 def beacon_truth(point, normal):
-    """Return the irradiance of `BEACON` with a sharpness of 3, for the light of the contract."""
+    """Return the closed form of E from a `BEACON` of sharpness 3, placed like the light of `test_lights`."""
     way, _, cosine = test_lights.toward(point)
     tangent = np.cross(test_lights.DIRECTION, [0, 0, 1]) / np.hypot(0.48, 0.8)
     turn = np.arctan2(-way @ np.cross(test_lights.DIRECTION, tangent), -way @ tangent)
@@ -234,7 +234,7 @@ def _fill_of(text):
 
 @pytest.mark.parametrize("estimator", ["light", "bdpt"])
 def test_all_estimators_agree_on_a_tabulated_light(add_kind, estimator):
-    """`light` samples the tabulated light from surfaces; `bdpt` also starts paths at it."""
+    """`light` and `bdpt` give the same mean picture as `mis`. `bdpt` also starts paths at the light."""
     add_kind("beacon", BEACON)
     light = replace(shining("beacon", 100.0), parameters={"sharpness": 3.0})
     view = RenderSettings(camera="0,1.5,3,0,0.2,0,40", width=8, height=6, spp=256)

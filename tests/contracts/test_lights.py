@@ -152,7 +152,7 @@ def test_the_profile_for_the_path_tracer_is_the_same_light(name, range_):
 @pytest.mark.parametrize("name", POSITIONED)
 @pytest.mark.parametrize("inner", [0.0, 0.3, OUTER])
 def test_power_is_the_flux_or_a_bound_of_it(name, inner):
-    """`power` is at least the flux, which is the integral of E over a unit sphere around the light."""
+    """`power` is 1 to 4 times the flux, which is the integral of E over a unit sphere around the light."""
     light = replace(light_of(name), inner_cone=inner)
     n = 4000 * 16
     z, turn = 1 - (2 * np.arange(n) + 1) / n, np.arange(n) * np.pi * (3 - 5**0.5)

@@ -19,7 +19,8 @@ def bake(scene, *, out, settings, progress, force):
     temporary.mkdir(parents=True)
     (temporary / "half.exr").write_bytes(b"half")
     if HOW == "exchanging":
-        # As an exchange of files leaves it between the old manifest and the new one.
+        # Leave the folder as if a kill interrupted the exchange of files: the old manifest is moved away, and
+        # the new one is not yet in its place.
         for part in ("new", "old"):
             (temporary / part).mkdir()
         (temporary / "new" / "bake.json").write_text("new")

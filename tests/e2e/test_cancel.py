@@ -16,7 +16,7 @@ from baker.io.temporary import TemporaryFolder
 
 FAKE = Path(__file__).with_name("fake_baker.py")
 ASSETS = Path(__file__).parents[2] / "assets"
-# Documented limit from the signal to the end of the process, seconds; it includes the grace period.
+# Largest documented time from the signal to the end of the process, seconds.
 LIMIT = 1.0
 
 

@@ -197,7 +197,7 @@ def test_cost_by_the_speed_of_a_bake(tmp_path):
     texels = round(0.8 * 64 * 64)
     assert cost["texels"] == texels
     assert cost["rays"] == {"inside geometry": 4 * texels, "ambient occlusion": 10 * texels}
-    # Estimated rates: 2 s for a million rays, 1 s for ten thousand texels.
+    # The rates of `bake.json`: 2 s for a million rays, 1 s for ten thousand texels.
     assert cost["seconds"] == pytest.approx(14 * texels * 2e-6 + texels * 1e-4, abs=0.01)
 
 

@@ -1,7 +1,7 @@
 """Irradiance in levels built like those of games, sampled at surface points as an engine samples it.
 
-The expected values are 0 where no light can arrive, closed forms where no light is reflected, and
-otherwise path-traced once (15,360 paths a point) and given with their standard error.
+The expected value is 0 where no light can arrive, and a closed form where no light is reflected. All other
+values were path-traced once with 15,360 paths per point, and are given with their standard error.
 """
 
 from __future__ import annotations

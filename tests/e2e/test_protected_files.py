@@ -1,6 +1,7 @@
 """No output of any command replaces an input or a file of a bake.
 
-Commands and options are found from the declarations: a new path is either listed as an output or is an input.
+The tests find commands and options in their declarations. Each option that takes a path is an output if
+`OUTPUTS` lists it, and otherwise an input.
 """
 
 from __future__ import annotations

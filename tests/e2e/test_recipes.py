@@ -14,7 +14,7 @@ import yaml
 
 ROOT = Path(__file__).parents[2]
 RECIPES = ROOT / "docs" / "recipes"
-# Settings of the shortest verification; the bakes are coarse, too.
+# Flags of a short `verify`.
 QUICK = "--texels 20 --spp 4"
 LIMITS = "irradiance.median > 0.5"
 
@@ -78,7 +78,8 @@ def test_the_makefile(game):
     assert code != 0
     assert "1 baked, 0 unchanged" in text
     assert told(game, "verify-cornell.xml") == (1, 1)
-    # The new bake is kept, and the stamp is older than the bake, so the next run verifies it again.
+    # The new bake is kept. The stamp file of the Makefile is older than the bake, so the next run
+    # verifies the bake again.
     stamp, bake = game / "reports" / "cornell.verified", game / "baked" / "cornell" / "bake.json"
     assert stamp.stat().st_mtime < bake.stat().st_mtime
 

@@ -26,7 +26,7 @@ from baker.rendering.settings import RenderSettings
 ASSETS = Path(__file__).resolve().parents[2] / "assets"
 CORNELL = ASSETS / "cornell.glb"
 SMALL = ("--width", "16", "--height", "12", "--spp", "4")
-# A camera 2 m in front of the centre of the unit square, which fills the picture.
+# Camera 2 m in front of the centre of the unit square. The square fills the picture.
 FRONT = "0.5,0.5,2,0.5,0.5,0,20"
 LIGHT = (3.0, 2.0, 1.0)
 

@@ -2,7 +2,7 @@
 
 The scene has two closed rooms side by side, one a thousand times brighter than the other. The reference is
 traced once and used for all changed maps, because it does not depend on the maps. Only the choice of
-texels would depend on them.
+texels would depend on the maps.
 """
 
 from __future__ import annotations

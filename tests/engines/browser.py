@@ -82,7 +82,7 @@ def serve(folders: Mapping[str, Path]) -> Iterator[str]:
             self.wfile.write(data)
 
         def log_message(self, *_: Any) -> None:
-            """Print no request log."""
+            """Do not print a log of requests."""
 
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
     thread = threading.Thread(target=server.serve_forever, daemon=True)

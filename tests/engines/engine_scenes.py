@@ -1,8 +1,9 @@
 """Bakes whose pixels in an engine are known: the probe (made-up light) and the room (constant light).
 
-The probe is a square of 2 x 2 m in the xy plane, seen from +z. All corners have the same TEXCOORD_0.
-TEXCOORD_1 is the whole page with v = 0 at the top. The irradiance of its four quadrants is pi, 2 pi, pi /
-4, pi / 2 (left to right, top to bottom), so albedo x E / pi is albedo times 1, 2, 1/4, 1/2.
+The probe is a square of 2 x 2 m in the xy plane, seen from +z. All corners have the same TEXCOORD_0, so an
+engine that reads the wrong uv set draws a single colour. TEXCOORD_1 covers the whole page with v = 0 at the
+top. The irradiance of the four quadrants is pi times 1 and 2 (top), and pi times 1/4 and 1/2 (bottom), from
+left to right. Therefore albedo x E / pi is the albedo times 1, 2, 1/4, 1/2.
 """
 
 from __future__ import annotations

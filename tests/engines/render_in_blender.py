@@ -1,4 +1,8 @@
-"""Renders an export, run by Blender's Python. Arguments: folder, camera (front or inside), image to write."""
+"""Renders an export `blender` with Cycles, in a Python that has the module `bpy`.
+
+`test_blender.py` starts this script. The arguments are the folder of the export, the view (`front` or
+`inside`) and the EXR file to write.
+"""
 
 import math
 import runpy

@@ -23,8 +23,8 @@ from proof import changed, lower_left_quarter, middles, shows_something_else, sh
 
 pytestmark = pytest.mark.engines_by_hand
 PROJECT = Path(__file__).parent / "godot3"
-# Exposures of the pictures. A picture has 8 bits, so a value is averaged over the exposures at which its code
-# is high.
+# Factors by which the light is multiplied, one for each picture. A picture has 8 bits, so the value of a
+# pixel is averaged over the pictures in which its code is between 120 and 250.
 EXPOSURES = [2.0 ** (k / 4) for k in range(-8, 17)]
 
 

@@ -1,7 +1,7 @@
 """`baker view` in a browser: pixels and displayed numbers are compared with the files of the bake.
 
-Expected pixel positions follow from the camera in the file, and expected colours from the EXR, decoded by
-another library.
+Expected pixel positions follow from the camera in `scene.glb`. Expected colours follow from the EXR and PNG
+files of the bake, which the test reads with the decoders that `baker view` uses, too.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from baker.viewer.script import find_three
 from baker.viewer.server import make_server
 
 pytestmark = pytest.mark.engines
-# Largest difference of sRGB bytes: the texture unit and the frame buffer may round up or down.
+# Largest permitted difference of a pixel, sRGB bytes. Texture unit and frame buffer may round up or down.
 LEVELS = 2
 MIDDLE = 0.35
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -63,7 +63,8 @@ class Page:
         return self.window.evaluate(expression)
 
     def wait_for(self, expression, seconds=10):
-        # Poll from this process, because the page's content policy forbids to evaluate waiting scripts in it.
+        # Poll from this process. Playwright's own waits evaluate a string in the page, which the page's
+        # Content-Security-Policy forbids.
         end = time.monotonic() + seconds
         while not self.ask(expression):
             assert time.monotonic() < end, f"waited in vain for {expression}"
@@ -312,14 +313,15 @@ def test_every_switch_shows_its_quantity(page):
     assert close(page.pixel(spot), srgb(page.light[1, row, column] * page.exposure * 2))
     assert page.ask("document.getElementById('exposure-value').innerText") == "+1.0 EV"
     page.show("5", "status")
-    # A surface that faces the viewer has the full brightness of the headlight, so its colours equal those of
-    # the legend.
+    # A texel has the colour of its status in the legend times the brightness of the headlight, which is 1 if
+    # the surface is seen along its normal.
     for kind, place in ((1, (0.1, 0.1)), (3, (0.25, 0.75)), (4, (0.55, 0.45))):
         row, column = texel_at(painted_uv(*place))
         assert page.status[0, row, column] == kind
         swatch = f"getComputedStyle(document.querySelectorAll('#legend .swatch')[{kind}]).backgroundColor"
         colour = [int(part) for part in re.findall(r"\d+", page.ask(swatch))]
-        # Brightness is 0.55 + 0.45 cos(view angle), with angles of up to 24 degrees off the axis.
+        # The brightness is 0.55 + 0.45 cos a, where a is the angle between the surface normal and the
+        # direction to the camera.
         x, y, _ = world(PAINTED_AT, *place)
         light = 0.55 + 0.45 * 5 / np.sqrt(x * x + y * y + 25)
         assert close(page.pixel(page.spot(*world(PAINTED_AT, *place))), np.array(colour) * light)

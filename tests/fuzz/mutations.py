@@ -1,7 +1,8 @@
 """Random changes of scene files, manifests, images and TOML files, each determined by a seed.
 
-A mutation changes one to three places. Numbers become extreme, wrong or of another type; texts become hostile
-names; keys are removed, duplicated or exchanged; bytes are replaced or cut off.
+Most mutations change one to three places, and those of float data up to eight. Numbers become extreme or get
+another type. Texts become hostile names. Keys are removed, duplicated or exchanged. Bytes are replaced,
+repeated, removed or cut off.
 """
 
 from __future__ import annotations
@@ -112,7 +113,7 @@ def _places(value: Any) -> Any:
 
 
 def _scalar(old: Any, rng: Generator) -> Any:
-    """Return a value to put in the place of another, mostly of the same type."""
+    """Return a value that replaces `old`; if `old` is a number or text, it mostly has the type of `old`."""
     kind = rng.random()
     if kind < 0.6 and isinstance(old, int | float):
         return NUMBERS[int(rng.integers(len(NUMBERS)))]
@@ -257,7 +258,7 @@ def mutate_toml(text: str, rng: Generator) -> bytes:
 
 
 def _toml_value(rng: Generator) -> str:
-    """Return a value in TOML's syntax, or text that is none."""
+    """Return the text of a TOML value, or text that is not valid TOML."""
     raw = ("[" * 2000 + "]" * 2000, "9" * 5000, "{a = {b = 1}}", "1979-05-27T07:32:00Z", "0x1F", "'''a\nb'''")
     pool = (*NUMBERS, *TEXTS, *raw, ["a", 1], [[]], True)
     value = pool[int(rng.integers(len(pool)))]

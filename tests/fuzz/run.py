@@ -1,11 +1,12 @@
-"""Runs many mutations of each target and prints those that are answered wrongly.
+"""Runs many mutations of each target of `targets.py`, and prints those that `baker` handles wrongly.
 
 python tests/fuzz/run.py                     # 1000 mutations of each scene for each target
 python tests/fuzz/run.py bake fix --count 50 --seed 7
 python tests/fuzz/run.py bake --scene 2 --only 7123
 
-With NUMBA_BOUNDSCHECK=1 and a NUMBA_CACHE_DIR of its own, kernels check every index. Each scene of a target
-runs in its own process, which is started again after a mutation that kills it.
+With NUMBA_BOUNDSCHECK=1, kernels check every index. Set NUMBA_CACHE_DIR to a separate folder then, because
+these kernels are compiled differently. Each scene of a target runs in a separate process, which is started
+again after a mutation that kills it.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from targets import ANSWERS, SCENES, TARGETS
 
-# A mutation that takes longer is reported, seconds.
+# Duration of a mutation, seconds. Longer ones are reported.
 LONGEST = 60.0
 
 
@@ -41,7 +42,7 @@ def run_here(name: str, scene: int, seeds: range) -> int:
 
 
 def run_apart(name: str, scene: int, seeds: range) -> int:
-    """Run mutations in processes of their own, print what is wrong, and return the number of failures."""
+    """Run mutations in a separate process, print the failures, and return their number."""
     failures, first = 0, seeds.start
     while first < seeds.stop:
         command = [sys.executable, __file__, name, "--scene", str(scene), "--seed", str(first)]

@@ -1,8 +1,12 @@
 """Runs `baker` on mutated input; every run must succeed or end with one clear sentence.
 
-A target writes one mutated input into a folder, runs the command through the Python API, and returns what is
-wrong, or None. An answer is wrong if it is no `BakerError`, has several lines or control characters, or if a
-NumPy warning reaches the user; and if a finished bake is not finite.
+A target writes one mutated input into a folder, runs the command through the Python API, and returns a
+description of what is wrong, or None. A run is wrong if
+
+- it raises an exception other than `BakerError`;
+- the message of the `BakerError` is too long, or has line breaks or control characters;
+- it issues a Python warning, such as one of NumPy;
+- it finishes a bake with values that are not finite.
 """
 
 from __future__ import annotations
@@ -38,7 +42,7 @@ LONGEST_MESSAGE = 1000
 
 Target = Callable[[Path, Path, Generator], str | None]
 TARGETS: dict[str, Target] = {}
-# Number of runs that succeeded, and of those that were refused with a sentence.
+# Numbers of runs that succeeded, and of runs that raised a `BakerError`.
 ANSWERS = Counter({"accepted": 0, "refused": 0})
 
 
@@ -49,7 +53,7 @@ def target(function: Target) -> Target:
 
 
 def wrong_answer(run: Callable[[], Any]) -> str | None:
-    """Call a function, and return what is wrong with its answer, None if it returns or is refused well."""
+    """Call a function. Return what is wrong, or None if it returns or raises a valid `BakerError`."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
@@ -62,7 +66,7 @@ def wrong_answer(run: Callable[[], Any]) -> str | None:
                 return f"a message of {len(text)} characters: {text[:200]!r}"
             if any(not c.isprintable() for c in text):
                 return f"a message with control characters: {text!r}"
-        except Exception:  # every other exception is the defect that is searched for
+        except Exception:  # any other exception is a defect
             return traceback.format_exc()
     return None
 
@@ -108,7 +112,7 @@ def check(scene: Path, folder: Path, rng: Generator) -> str | None:
 
 @target
 def damaged(scene: Path, folder: Path, rng: Generator) -> str | None:
-    """Damage the manifest, an image or the scene of a bake, then verify, compare and inspect it."""
+    """Damage the manifest or another file of a bake, then verify, compare and inspect the bake."""
     sound = folder / f"sound-{scene.stem}"
     if not sound.exists():
         baker.bake(scene, out=sound, **SMALL)

@@ -1,7 +1,7 @@
 """A few random mutations for each target; `tests/fuzz/run.py` runs many.
 
-With NUMBA_BOUNDSCHECK=1 (and a NUMBA_CACHE_DIR of its own) kernels are compiled with checked indices, and
-other seeds are used.
+With NUMBA_BOUNDSCHECK=1 and NUMBA_CACHE_DIR set to a separate folder, kernels are compiled with checked
+indices, and the tests use other seeds.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from baker.trace.jit import kernel
 
 CHECKED = bool(numba.config.BOUNDSCHECK)
 SEEDS = range(100_000, 100_040) if CHECKED else range(12)
-# Targets that read text files only run more mutations, on one scene.
+# {target that reads only text files: number of its mutations}. These targets run on one scene.
 TEXT = {"config": 100, "jobs": 40}
 CASES = [(name, scene) for name in TARGETS for scene in range(1 if name in TEXT else len(SCENES))]
 
@@ -27,7 +27,7 @@ def test_mutations_are_baked_or_refused_with_a_sentence(name, scene, tmp_path):
     for seed in range(TEXT[name]) if name in TEXT else SEEDS:
         found = TARGETS[name](SCENES[scene], tmp_path, np.random.default_rng(seed))
         assert found is None, f"python tests/fuzz/run.py {name} --scene {scene} --only {seed}\n{found}"
-    # Mutations that are all refused, or never, test little.
+    # Some mutations are accepted and some are refused. Otherwise they would test little.
     assert ANSWERS["accepted"] > before["accepted"]
     assert ANSWERS["refused"] > before["refused"]
 

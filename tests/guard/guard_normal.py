@@ -23,7 +23,7 @@ REMOVED_KEYS = frozenset(
 REPLACED = (
     # Progress lines are printed every few seconds, so their number and content depend on the machine.
     (re.compile(r"^[a-z][a-z ]*:  \d+ %.*\n", re.MULTILINE), ""),
-    # Seconds and their indentation.
+    # Durations, and the spaces before them, whose number depends on the number of digits.
     (re.compile(r"^\d+\.\d\d s: .*$", re.MULTILINE), lambda m: re.sub(r"\d+\.\d\d", "<time>", m[0])),
     (re.compile(r" *\b\d[\d.,]* (Mrays/s|s\b)"), r" <number> \1"),
     # The size of the manifest depends on the number of digits of its times.
@@ -56,7 +56,7 @@ def normal_text(text: str, places: dict[str, str]) -> str:
 
 
 def normal_json(value: Any, places: dict[str, str]) -> Any:
-    """Return a JSON value without `REMOVED_KEYS`, in the same key order, with normal strings."""
+    """Return a JSON value without `REMOVED_KEYS`, in the same key order; strings become `normal_text`."""
     if isinstance(value, dict):
         return {key: normal_json(item, places) for key, item in value.items() if key not in REMOVED_KEYS}
     if isinstance(value, list):

@@ -4,9 +4,9 @@
     python tests/guard/outputs.py --compare FILE     records it again and prints the differences
     python tests/guard/outputs.py --against COMMIT   records both versions and prints the differences
 
-The exit code is 1 if there are differences. The guard uses only the command line, so modules may be moved
-and renamed. A record is valid on one machine only, because the processor and libraries change the last
-bits of results.
+The exit code is 1 if there are differences. The guard, that is this script and the modules `guard_*.py`, uses
+only the command line of `baker`, so modules may be moved and renamed. A record is valid on one machine only,
+because the processor and libraries change the last bits of results.
 """
 
 from __future__ import annotations

@@ -20,8 +20,9 @@ from baker.pathtracer.scene import Reference, build_reference
 UP = (0.0, 0.0, 1.0)
 WITHIN = 0.002
 COPIES = 256
-# About 190 points are tested, and one in 370 is beyond three standard errors by chance. With seed 0 one point
-# was, at 3.2 standard errors. Its mean error over 200 other seeds is 0.003 % +- 0.003 %.
+# Seed of the reference. About 190 points are tested, and by chance one in 370 points deviates by more than
+# three standard errors. With seed 0, one point deviated by 3.2 standard errors. The mean error of this point
+# over 200 other seeds is 0.003 % +- 0.003 %.
 SEED = 1
 
 
@@ -90,11 +91,16 @@ def _passes(
 def assert_closed_form(found: PointEstimate, truth: Any, *, channel: int = 0, rounding: float = 1e-5) -> None:
     """Compare n points, each traced as the same number of copies, with their truth (n,).
 
-    The error is at most three reported standard errors and at most 0.2 %, three standard errors are below
-    0.2 %, and the standard errors match the standard deviation of the copies. `rounding` is a relative
-    error that is not noise: it comes from float32 and from ray origins, which are offset by 1e-5 of the
-    scene. Seeds are fixed. After a change of random numbers a point may be beyond three standard errors by
-    chance. The result is incorrect only if the point stays there with other seeds.
+    Asserts for each point that
+
+    - its error is at most three reported standard errors plus `rounding`, and at most 0.2 %;
+    - three standard errors are less than 0.2 %;
+    - the standard errors match the standard deviation of the copies.
+
+    `rounding` is a relative error that is not noise. It comes from float32 and from ray origins, which are
+    offset by 1e-5 of the scene. Seeds are fixed. After a change of random numbers, a point may deviate
+    by more than three standard errors by chance. The result is incorrect only if the point also does so with
+    other seeds.
     """
     truth = np.atleast_1d(np.asarray(truth, float))
     mean = found.mean[:, channel].reshape(len(truth), -1)
@@ -123,7 +129,8 @@ def _assert_believable(mean: Any, error: Any, report: str) -> None:
     n = mean.shape[1]
     ratio = float((real[noisy] / reported[noisy]).mean())
     degrees = noisy.sum() * (n - 1)
-    # A reported error is estimated from the passes of a copy, so it has about as many degrees of freedom.
+    # The reported variance is estimated from the passes of each copy, so both variances have about equally
+    # many degrees of freedom.
     low, high = stats.f.ppf([5e-5, 1 - 5e-5], degrees, degrees)
     assert low < ratio < high, (
         f"copies vary {ratio:.3f} times as reported (from {low:.3f} to {high:.3f})\n{report}"

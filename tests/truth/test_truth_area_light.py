@@ -13,7 +13,7 @@ UP = (0.0, 1.0, 0.0)
 
 
 def square_over(height, half=0.5):
-    """Return the corners of a square at `height`, counter-clockwise from below: it shines downwards."""
+    """Return the corners of a square at `height`, counter-clockwise seen from below, its front."""
     return np.array(
         [(-half, height, -half), (half, height, -half), (half, height, half), (-half, height, half)]
     )
@@ -44,7 +44,7 @@ def test_parallel_square_at_every_texel(denoise):
     mean = np.mean(found, axis=0)
     # The denoiser adds a little of the other colours to a colour without light.
     assert mean[..., 2].max() <= (0.01 * mean.max() if denoise else 0)
-    # Six bakes with 64 light samples each: 384 stratified samples a texel have noise under 2 %.
+    # Six bakes have 6 x 64 = 384 stratified light samples per texel, whose mean has a noise below 2 %.
     lit = truth[..., :2]
     assert np.abs(mean[..., :2] / lit - 1).max() < (0.04 if denoise else 0.03)
     if not denoise:
@@ -73,7 +73,7 @@ def test_close_up_there_is_neither_bias_nor_a_spark(height):
 
 
 def test_penumbra_from_its_first_to_its_last_hair():
-    """A screen hides a part of the emitter that depends on x: texels see none, a rectangle, or all of it."""
+    """Depending on a texel's x, a screen hides the whole emitter, a part that is a rectangle, or nothing."""
     found = []
     for seed in range(SEEDS):
         builder = SceneBuilder(64)
@@ -172,6 +172,6 @@ def test_a_thousand_emitters_against_the_sum_of_their_closed_forms():
 
     truth = floor.texel_mean(irradiance, 2)
     assert_unbiased([f.mean() for f in found], truth.mean(), least=0.01)
-    # 64 light rays a texel choose among 1000 triangles. The mean of 6 bakes has a noise of 5 %; the bound is
-    # four standard deviations.
+    # The 64 light rays of a texel choose among 1000 triangles. The mean over six bakes has a noise of 5 %,
+    # and the bound is four times this noise.
     assert np.abs(np.mean(found, axis=0) / truth - 1).max() < 0.2

@@ -33,9 +33,8 @@ def lit(*texels):
 def panels(size=48):
     """Return a builder with three panels over a black floor, and the floor.
 
-    The red panel has one lit texel, the green one 5 x 5 mirrored repeats of one lit texel, and the blue one
-    a grid
-    of lit texels.
+    The texture of the red panel has one lit texel. The green panel has 5 x 5 mirrored repeats of a texture
+    with one lit texel. The texture of the blue panel has a grid of lit texels.
     """
     builder = SceneBuilder(size)
     floor = builder.quad((-1.5, 0, -1.5), (0, 0, 3), (3, 0, 0), builder.material(0.0), (16, 16))

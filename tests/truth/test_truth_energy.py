@@ -13,7 +13,7 @@ from baker.radiosity.solve import solve_radiosity
 
 
 def open_room(albedo=0.7, texels=12):
-    """Return a builder and its quads: room without ceiling, emitter, one-sided and double-sided screen."""
+    """Return (builder, quads of the room) of a room without ceiling, with an emitter and two screens."""
     builder = SceneBuilder(64)
     walls = builder.material((albedo, 0.5 * albedo, 0.1))
     quads = builder.box((0, 0, 0), (3, 2, 2), walls, texels, inward=True)
@@ -33,7 +33,8 @@ def test_what_is_emitted_is_absorbed_or_escapes(albedo, sky):
     energy = solve["energy"]
     assert energy["emitted"] > 0
     assert energy["escaped"] > 0.02 * energy["emitted"]
-    # Row sums of the matrix have errors of a few 1e-4, and the solver stops at 3e-5.
+    # The row sums of the form factor matrix have errors of a few 1e-4, and the solve stops at an estimated
+    # relative error of 3e-5.
     assert energy["absorbed"] + energy["escaped"] == pytest.approx(energy["emitted"], rel=1e-3)
     assert solve["residual"] < 1e-4
 
@@ -69,7 +70,7 @@ def system():
 
 @pytest.mark.parametrize("bounces", [0, 1, 2, 3, 7])
 def test_bounces_are_terms_of_the_neumann_series(system, bounces):
-    """E = F (s + rho F s + ...) with one product less than bounces; the final gather adds a bounce."""
+    """The solve gives the first `bounces` - 1 terms of F s + F rho F s + ...; the final gather adds one."""
     patches, matrix, albedo, source, full = system
     found = solve_radiosity(matrix, source, albedo, patches.area, bounces=bounces, progress=silent)
     term, total = source, np.zeros_like(source)
@@ -86,7 +87,7 @@ def test_converged_solution_is_that_of_the_dense_system(system):
     for c in range(3):
         exitance = np.linalg.solve(np.eye(patches.n) - albedo[:, c, None] * full, source[:, c])
         truth = full @ exitance
-        # The solver stops when the error of each patch is 3e-5 of its light.
+        # The solve stops when the estimated error of each patch is at most 3e-5 of the patch's light.
         assert np.linalg.norm(found.irradiance[:, c] - truth) < 1e-4 * np.linalg.norm(truth)
     assert found.residual < 1e-4
 
@@ -113,8 +114,8 @@ def test_many_bounces_converge_to_the_default():
     before = np.inf
     for bounces in (0, 1, 3, 40):
         value = builder.bake(samples=32, bounces=bounces).lightmaps["irradiance"].value[on]
-        # Each bounce adds light, and the rays do not depend on `bounces`; the tolerance is that of the
-        # solver.
+        # Each bounce adds light, and the rays do not depend on `bounces`. The tolerance is for the error of
+        # the solve.
         assert (value <= page + 1e-4 * page.max()).all()
         away = float((page - value).max())
         assert away < before

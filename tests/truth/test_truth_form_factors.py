@@ -84,9 +84,9 @@ def test_inside_a_sphere_every_pair_depends_on_the_target_only():
     area = np.bincount(group, patches.area)
     found = between(group, patches, matrix)
     ratio = found / (area / area.sum())
-    # A pair of groups has 16 x 6 x 512 x 0.05 = 2400 hits in each direction, so at most 1.4 % noise. The 320
-    # flat faces differ from the sphere by up to 2 %. A group has less than the sphere's form factor to
-    # itself, because each of its 16 flat faces has none to itself.
+    # A group casts 16 x 6 x 512 rays, of which 1/20 hit each other group. These 2400 hits in both directions
+    # give a pair of groups a noise of 1.4 %. The 320 flat faces differ from the sphere by up to 2 %. The form
+    # factor of a group to itself is 15/16 of that on a sphere, because a flat face does not see itself.
     apart = ratio[~np.eye(20, dtype=bool)]
     assert np.abs(apart - 1).max() < 0.04
     assert apart.std() < 0.015
@@ -118,7 +118,7 @@ def test_closed_room_of_unequal_areas_loses_nothing(n_rays):
     # No ray leaks through an edge: none hits the sky or the outside of a wall.
     assert matrix.sky.max() == 0
     assert matrix.lost.max() == 0
-    # Thirty balancing sweeps bring row sums to 1 within 0.1 %. Float32 values are reciprocal up to rounding.
+    # After the balancing sweeps, row sums are 1 within 0.1 %. Float32 values are reciprocal up to rounding.
     assert np.abs(matrix.row_sums() - 1).max() < 1e-3
     flux = dense(patches, matrix).astype(np.float64) * patches.area[:, None]
     assert np.abs(flux - flux.T).max() <= 3e-7 * flux.max()

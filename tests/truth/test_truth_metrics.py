@@ -25,7 +25,7 @@ from baker.pathtracer.estimators import ESTIMATORS
 
 SQUARE = np.array([[(0, 0, 0), (1, 0, 0), (1, 1, 0)], [(0, 0, 0), (1, 1, 0), (0, 1, 0)]]) - (0.5, 0.5, 0)
 
-# {estimator: samples of a pass}. Estimators that only hit or only sample lights need more samples.
+# {estimator: samples of a pass}. Estimators without MIS only hit lights or only sample them, and need more.
 RAYS = {name: 256 if how.aim == 2 else 1024 for name, how in ESTIMATORS.items()}
 
 # {estimator: (albedo of each colour, passes of 256 x 64 paths)}. With uniform directions the variance is

@@ -82,7 +82,7 @@ def compared():
         face = np.cross(world[1] - world[0], world[2] - world[0])
         face *= np.sign(np.linalg.det(matrix[:3, :3])) / np.linalg.norm(face)
         point, normal = weight @ world, np.tile(face, (PATHS, 1))
-        # Exclude texels with points under the boxes, which the bake replaces.
+        # Exclude texels with points under the boxes, because the bake computes no light for such points.
         free[k] = not tracer.inside_geometry(point, normal).any()
         value = tracer.irradiance(point, normal, rng)
         mean[k], error[k] = value.mean(axis=0), value.std(axis=0) / PATHS**0.5
@@ -93,7 +93,8 @@ def compared():
 def test_every_texel_agrees_within_error_bars(compared):
     bakes, mean, error = compared
     away = bakes.mean(axis=0) - mean
-    # Both standard errors, and 1 % because light after the first bounce is constant over a patch.
+    # The tolerance combines both standard errors and 1 % of the mean. The 1 % are needed because the bake's
+    # light after the first bounce is constant over a patch.
     both = np.sqrt(error**2 + bakes.var(axis=0, ddof=1) / SEEDS + (0.01 * mean) ** 2)
     assert np.median(error / mean) < 0.02
     z = np.abs(away / both)

@@ -29,7 +29,8 @@ def test_one_candela_gives_one_lux_at_one_metre(denoise):
     builder, floor = floor_scene(half=0.02, texels=9)
     builder.light("point", 1.0, position=(0.0, 1.0, 0.0))
     value = floor.values(builder.bake(denoise=denoise))
-    # 3 cm off the centre E is 1 - 2 * 0.028**2 = 0.9984; ray origins are 1e-5 above the floor.
+    # In the corners of the floor, 2.8 cm from its centre, E is 1 - 2 * 0.028**2 = 0.9984. Ray origins are
+    # 1e-5 m above the floor.
     assert value[4, 4] == pytest.approx([1.0, 1.0, 1.0], abs=1e-4 if not denoise else 2e-3)
     assert value.min() > 0.997
 

@@ -36,7 +36,7 @@ def test_emitter_shines_from_its_front_and_from_both_if_double_sided(double_side
     square = [(-0.5, 1, -0.5), (0.5, 1, -0.5), (0.5, 1, 0.5), (-0.5, 1, 0.5)]
     truth = 10.0 * floor.texel_mean(lambda p: polygon_irradiance(square, p, UP))
     assert_unbiased([f.mean(axis=0) for f in found], truth.mean(axis=0), least=0.01)
-    # 64 unblocked, stratified light rays a texel have a noise under 5 %.
+    # The 64 stratified light rays of a texel are unblocked. Their mean has a noise below 5 %.
     assert np.abs(np.mean(found, axis=0) / truth - 1).max() < 0.05
 
 

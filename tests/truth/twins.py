@@ -1,4 +1,4 @@
-"""Helpers of the truth tests that call kernels directly."""
+"""Closest hits of arbitrary rays, traced in packets as kernels do, for truth tests."""
 
 from __future__ import annotations
 

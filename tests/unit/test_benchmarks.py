@@ -1,3 +1,5 @@
+"""Benchmarks: geometry of the blob room, figures in the tables, and measured rates of a tiny bake."""
+
 import importlib.util
 import json
 import subprocess

@@ -73,41 +73,45 @@ def vertex(*alpha):
     return {"COLOR_0": np.float32([[1, 1, 1, a] for a in alpha])}
 
 
-CELL = UV * np.float32([0.1, 1]) + np.float32([0.3, 0])  # within the second of four blocks
+CELL = UV * np.float32([0.1, 1]) + np.float32([0.3, 0])  # within the second of the four blocks of `cells`
 GONE = {
     "BLEND, factor 0": one("BLEND", 0.0),
     "MASK, factor below the cutoff": one("MASK", 0.49),
-    "MASK, factor below a cutoff of its own": one("MASK", 0.7, cutoff=0.8),
+    "MASK, factor below a cutoff that the file sets": one("MASK", 0.7, cutoff=0.8),
     "MASK, cutoff above 1": one("MASK", cutoff=1.5),
-    "BLEND, texture": one("BLEND", image=png(np.zeros((4, 4)))),
-    "MASK, texture": one("MASK", image=png(np.full((4, 4), 127))),
-    "MASK, factor times texture": one("MASK", 0.7, image=png(np.full((4, 4), 180))),
-    "MASK, factor times texture times vertex": one(
+    "BLEND, texture of alpha 0": one("BLEND", image=png(np.zeros((4, 4)))),
+    "MASK, texture below the cutoff": one("MASK", image=png(np.full((4, 4), 127))),
+    "MASK, factor times texture below the cutoff": one("MASK", 0.7, image=png(np.full((4, 4), 180))),
+    "MASK, factor times texture times vertex alpha below the cutoff": one(
         "MASK", 0.9, image=png(np.full((4, 4), 180)), **vertex(0.7, 0.7, 0.6, 0.7)
     ),
-    "BLEND, vertex colours": one("BLEND", **vertex(0, 0, 0, 0)),
-    "BLEND, an empty cell": one("BLEND", image=cells(255, 0, 255, 255), uv=CELL),
-    "MASK, an empty cell, repeated": one("MASK", image=cells(255, 9, 255, 255), uv=CELL + np.float32([3, 0])),
-    "MASK, an empty cell, mirrored": one(
+    "BLEND, vertex alpha 0": one("BLEND", **vertex(0, 0, 0, 0)),
+    "BLEND, uv in a transparent block": one("BLEND", image=cells(255, 0, 255, 255), uv=CELL),
+    "MASK, uv in a transparent block, repeated": one(
+        "MASK", image=cells(255, 9, 255, 255), uv=CELL + np.float32([3, 0])
+    ),
+    "MASK, uv in a transparent block, mirrored": one(
         "MASK", image=cells(255, 255, 0, 255), uv=CELL + np.float32([1, 0]), wrap=33648
     ),
-    "BLEND, clamped to an empty border": one(
+    "BLEND, uv clamped to a transparent border": one(
         "BLEND", image=cells(255, 255, 255, 0), uv=UV + np.float32([2, 0]), wrap=33071
     ),
 }
 SEEN = {
-    "OPAQUE has no alpha": one("OPAQUE", 0.0),
-    "BLEND, little": one("BLEND", 0.01),
-    "MASK, at the cutoff": one("MASK", 0.5),
+    "OPAQUE, alpha is ignored": one("OPAQUE", 0.0),
+    "BLEND, factor 0.01": one("BLEND", 0.01),
+    "MASK, factor at the cutoff": one("MASK", 0.5),
     "MASK, cutoff 0": one("MASK", 0.0, cutoff=0.0),
     "MASK, texture at the cutoff": one("MASK", image=png(np.full((4, 4), 128))),
-    "BLEND, one texel": one("BLEND", image=png(np.eye(1, 64 * 64, 2019).reshape(64, 64) * 255)),
-    "MASK, one corner": one("MASK", **vertex(0, 0, 0, 1)),
-    "BLEND, a painted cell": one("BLEND", image=cells(0, 255, 0, 0), uv=CELL),
-    "BLEND, a painted cell, mirrored": one(
+    "BLEND, texture with one opaque texel": one(
+        "BLEND", image=png(np.eye(1, 64 * 64, 2019).reshape(64, 64) * 255)
+    ),
+    "MASK, one opaque vertex": one("MASK", **vertex(0, 0, 0, 1)),
+    "BLEND, uv in an opaque block": one("BLEND", image=cells(0, 255, 0, 0), uv=CELL),
+    "BLEND, uv in an opaque block, mirrored": one(
         "BLEND", image=cells(0, 0, 255, 0), uv=CELL + np.float32([1, 0]), wrap=33648
     ),
-    "BLEND, clamped to a painted border": one(
+    "BLEND, uv clamped to an opaque border": one(
         "BLEND", image=cells(0, 0, 0, 255), uv=UV + np.float32([2, 0]), wrap=33071
     ),
 }

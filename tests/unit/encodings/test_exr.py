@@ -1,3 +1,5 @@
+"""EXR files: decoded pixels equal the encoded ones, bytes follow the format, broken files are refused."""
+
 from __future__ import annotations
 
 import hashlib

@@ -1,3 +1,5 @@
+"""Denoised synthetic pages, compared with their light without noise, inside charts and at chart borders."""
+
 from __future__ import annotations
 
 import sys

@@ -1,3 +1,5 @@
+"""`fill_invalid` on small pages, compared with plain loops over rings of neighbours."""
+
 from __future__ import annotations
 
 import finish_pages as pages

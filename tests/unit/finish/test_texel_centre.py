@@ -1,3 +1,5 @@
+"""`recentre` and `dilate`, compared with dense least squares, plain loops and the known light of a page."""
+
 from __future__ import annotations
 
 import finish_pages as pages

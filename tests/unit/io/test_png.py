@@ -1,3 +1,5 @@
+"""PNG files are decoded by Pillow and compared with the encoded pixels."""
+
 from __future__ import annotations
 
 import io

@@ -1,4 +1,4 @@
-"""TOML files that Python's reader refuses with other exceptions than its own."""
+"""TOML files for which Python's reader raises other exceptions than its own give a one-sentence error."""
 
 from __future__ import annotations
 

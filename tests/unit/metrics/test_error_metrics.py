@@ -1,3 +1,5 @@
+"""Error metrics, compared with values computed by hand and with the spread of random samples."""
+
 from __future__ import annotations
 
 import numpy as np

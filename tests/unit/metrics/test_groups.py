@@ -1,3 +1,5 @@
+"""Bias and typical error of groups of points, compared with known deviations of random samples."""
+
 from __future__ import annotations
 
 import math

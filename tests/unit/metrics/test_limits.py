@@ -1,3 +1,5 @@
+"""`parse_limits` and `evaluate_limits`: limits at, above and below a figure, and texts that are refused."""
+
 from __future__ import annotations
 
 import pytest

@@ -1,3 +1,5 @@
+"""Texels, points and lookups that `verify` and `diff` choose, compared with the geometry of simple scenes."""
+
 from __future__ import annotations
 
 import numpy as np

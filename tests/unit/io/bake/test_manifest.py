@@ -1,3 +1,5 @@
+"""The `bake.json` of hand-made bakes, compared with its JSON schema, the bake and docs/MANIFEST.md."""
+
 from __future__ import annotations
 
 import json

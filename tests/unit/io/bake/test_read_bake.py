@@ -1,3 +1,5 @@
+"""`read_bake` returns what `write_bake` wrote, and refuses damaged folders with the name of the file."""
+
 from __future__ import annotations
 
 import json

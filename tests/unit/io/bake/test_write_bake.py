@@ -1,3 +1,5 @@
+"""`write_bake`: the written files equal the bake, and after any failure the folder has its old content."""
+
 from __future__ import annotations
 
 import hashlib
@@ -44,7 +46,7 @@ def test_the_folder_holds_what_was_baked(tmp_path: Path) -> None:
     manifest = write_bake(result, tmp_path / "new" / "parent" / "out")
     out = tmp_path / "new" / "parent" / "out"
     assert names(out) == NAMES
-    assert names(out.parent) == ["out"], "nothing temporary stays"
+    assert names(out.parent) == ["out"], "no temporary folder is left"
     for channel, lightmap in result.lightmaps.items():
         image = decode_exr(out / f"{channel}_0.exr")
         assert np.array_equal(image.pixels, lightmap.value[0].astype(np.float16).astype(np.float32))
@@ -127,7 +129,7 @@ def test_places_that_cannot_be_a_folder_are_refused(tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     check_out(tmp_path / "empty")
     check_out(tmp_path / "no" / "such" / "parent")
-    assert names(tmp_path) == ["empty", "file"], "checking makes nothing"
+    assert names(tmp_path) == ["empty", "file"], "`check_out` creates no folder"
 
 
 def test_a_bake_never_replaces_its_own_input(tmp_path: Path) -> None:
@@ -223,7 +225,7 @@ def test_the_current_folder_is_written_file_by_file(tmp_path: Path, monkeypatch:
     inode = out.stat().st_ino
     monkeypatch.chdir(out)
     write_bake(replace(result, lightmaps={"ao": result.lightmaps["ao"]}), Path())
-    assert out.stat().st_ino == inode, "the shell that stands here does not lose the ground"
+    assert out.stat().st_ino == inode, "the working directory of a shell is not replaced"
     assert names(out) == sorted({*NAMES, "notes.txt"} - {"irradiance_0.exr"})
     write_bake(result, Path(), created=NOON)
     assert tree(out) == before

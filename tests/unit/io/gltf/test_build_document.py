@@ -1,3 +1,5 @@
+"""`scene.glb` of scenes that were made without a glTF file: it is loaded and compared with the scene."""
+
 from __future__ import annotations
 
 import io

@@ -1,3 +1,5 @@
+"""`Packer` drops unused accessors and views; the remaining data are compared byte for byte with the input."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""`make_glb`: the written GLB has the uv of the atlas, and all other data equal those of the source file."""
+
 from __future__ import annotations
 
 import copy
@@ -70,7 +72,7 @@ def test_strip_becomes_triangles_with_its_winding(rich: tuple[Glb, Glb, Scene]) 
     assert found.get("mode", 4) == 4
     corner = after.corners(found, "POSITION").astype(np.float64)
     cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    assert cross[:, 2].tolist() == [1.0, 1.0], "two halves of a unit square, both facing +z"
+    assert cross[:, 2].tolist() == [1.0, 1.0], "two triangles of area 1/2 that face +z"
 
 
 def test_texcoord_1_is_the_layout(rich: tuple[Glb, Glb, Scene]) -> None:
@@ -121,7 +123,7 @@ def test_each_instance_has_its_own_mesh_and_the_unbaked_node_the_old_one(
     before, after, _ = rich
     meshes = [after.json["nodes"][node]["mesh"] for node in (0, 1, 4, 5)]
     assert len(set(meshes)) == 4
-    assert meshes[2:] == [0, 1], "node 4 stands in another scene; node 5 has a mesh of its own"
+    assert meshes[2:] == [0, 1], "node 4, in another scene, keeps mesh 0; node 5 keeps mesh 1"
     unbaked = after.json["meshes"][0]["primitives"]
     for a, b in zip(before.json["meshes"][0]["primitives"], unbaked, strict=True):
         assert a == b
@@ -160,7 +162,7 @@ def test_ao_is_the_occlusion_texture_of_the_page(rich: tuple[Glb, Glb, Scene]) -
             assert image["mimeType"] == "image/png"
             assert after.view(image["bufferView"]) == PNG[page]
     names = [m.get("name") for m in document["materials"]]
-    assert names.count("grey") == 3, "as it was for lines, and one for each page"
+    assert names.count("grey") == 3, "the original material for lines, and a copy for each of the two pages"
 
 
 def test_the_same_bytes_twice_and_the_input_untouched(tmp_path: Path) -> None:
