@@ -14,6 +14,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from baker.core.version import VERSION as __version__
+
 if TYPE_CHECKING:
     from baker.api.bakes import ao, bake, export, save
     from baker.api.results import batch, diff, render, verify, view
@@ -39,7 +41,6 @@ if TYPE_CHECKING:
     from baker.verification.verify import VerifyReport
     from baker.viewer.server import ViewServer
 
-__version__ = "0.1.0"
 
 # Names of the API by the module that defines them.
 _HOMES = {

@@ -8,11 +8,13 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-PACKAGES = ("baker", "numpy", "scipy", "numba", "embreex", "xatlas", "pyoidn", "OpenEXR")
+from baker.core.version import VERSION
+
+PACKAGES = ("numpy", "scipy", "numba", "embreex", "xatlas", "pyoidn", "OpenEXR")
 
 
 def describe() -> dict[str, str | float | int]:
-    """Return {property: value} of the machine, and the versions of Python and of `PACKAGES`."""
+    """Return {property: value} of the machine, and the versions of Python, baker and `PACKAGES`."""
     found: dict[str, str | float | int] = {
         "date": datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d"),
         "processor": _processor(),
@@ -20,6 +22,7 @@ def describe() -> dict[str, str | float | int]:
         "memory_gb": _memory(),
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
+        "baker": VERSION,
     }
     for name in PACKAGES:
         try:

@@ -9,6 +9,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from baker.cli.commands import COMMANDS
+from baker.core.version import VERSION
 
 if TYPE_CHECKING:
     from baker.cli.session import Session
@@ -29,6 +30,10 @@ class LazyGroup(TyperGroup):
             return self.commands[cmd_name]
         return getattr(importlib.import_module(f"baker.cli.{cmd_name}"), cmd_name)()
 
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the arguments before the subcommand; `help COMMAND` is read as `COMMAND --help`."""
+        return super().parse_args(ctx, [*args[1:], "--help"] if args[:1] == ["help"] else args)
+
     _listing = False
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
@@ -41,7 +46,9 @@ class LazyGroup(TyperGroup):
 def make_app() -> Any:
     """Return the command `baker` with all its subcommands."""
     app = typer.Typer(
-        cls=LazyGroup, add_completion=False, context_settings={"help_option_names": ["-h", "--help"]}
+        cls=LazyGroup,
+        context_settings={"help_option_names": ["-h", "--help"]},
+        epilog="`baker help COMMAND` or `baker COMMAND --help` describes a command.",
     )
     app.callback(invoke_without_command=True)(_root)
     group = typer.main.get_command(app)
@@ -52,20 +59,17 @@ def make_app() -> Any:
 
 def _root(
     ctx: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+    version: Annotated[bool, typer.Option("--version", "-V", help="Print the version and exit.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
 ) -> None:
     """Radiosity lightmaps and ambient occlusion for game assets, on a CPU."""
     session: Session = ctx.obj
     session.as_json = as_json
     if version:
-        from importlib.metadata import version as installed
-
-        number = installed("baker")
         if as_json:
-            session.write_json({"version": number})
+            session.write_json({"version": VERSION})
         else:
-            session.out.write(f"baker {number}\n")
+            session.out.write(f"baker {VERSION}\n")
         raise typer.Exit
     if ctx.invoked_subcommand is None:
         typer.echo(ctx.get_help())

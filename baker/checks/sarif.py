@@ -6,13 +6,13 @@ Based on: OASIS, Static Analysis Results Interchange Format (SARIF) Version 2.1.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from baker.checks.finding import Finding, finding_json
 from baker.checks.rule import Check, all_checks
 from baker.checks.run import CheckReport
+from baker.core.version import VERSION
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 _LEVEL = {"info": "note", "warning": "warning", "error": "error"}
@@ -37,7 +37,7 @@ def sarif_log(reports: Sequence[CheckReport], folder: Path) -> dict[str, Any]:
     index = {entry.code: k for k, entry in enumerate(checks)}
     driver = {
         "name": "baker",
-        "semanticVersion": version("baker"),
+        "semanticVersion": VERSION,
         "rules": [_rule(entry) for entry in checks],
     }
     results = [

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from baker.core.colour import LUMINANCE_WEIGHTS
 from baker.core.errors import ResourceError, SettingsError
+from baker.core.version import VERSION
 from baker.encodings.exr import encode_layers
 from baker.io.output_path import resolved_output
 from baker.io.png import encode_png, grey_levels, srgb_levels
@@ -149,4 +149,4 @@ def _header(picture: Picture) -> dict[str, str]:
 
 
 def _signature() -> str:
-    return f"baker {version('baker')}"
+    return f"baker {VERSION}"

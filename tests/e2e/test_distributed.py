@@ -27,11 +27,10 @@ ASSETS = Path(__file__).parents[2] / "assets"
 SETTINGS = {"resolution": 64, "samples": 8, "ao_samples": 4, "denoise": False, "threads": 1}
 # Program of a worker that reports another version of baker.
 OTHER = """
-import importlib.metadata as metadata
 import sys
+import baker.core.version
 from distributed.cli.dask_worker import main
-true = metadata.version
-metadata.version = lambda name: "9.9.9" if name == "baker" else true(name)
+baker.core.version.VERSION = "9.9.9"
 sys.argv[0] = "dask-worker"
 main()
 """

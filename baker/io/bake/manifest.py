@@ -20,13 +20,14 @@ from baker.core.light_kind import kind_of
 from baker.core.lightmap import BakeResult, Lightmap
 from baker.core.scene import SceneWarning
 from baker.core.settings import BakeSettings
+from baker.core.version import VERSION as BAKER_VERSION
 
 # Version of the manifest's layout; it changes when the name or the meaning of a key changes.
 VERSION = 1
 
 # Key in `versions` of the manifest -> installed distribution, for libraries that can change texel values.
 _LIBRARIES = {
-    "baker": "baker", "embree": "embreex", "xatlas": "xatlas", "numba": "numba", "numpy": "numpy",
+    "embree": "embreex", "xatlas": "xatlas", "numba": "numba", "numpy": "numpy",
     "scipy": "scipy", "openimagedenoise": "pyoidn", "openexr": "OpenEXR", "pillow": "Pillow",
 }  # fmt: skip
 
@@ -168,7 +169,7 @@ def library_versions() -> dict[str, str | None]:
             versions[name] = metadata.version(distribution)
         except metadata.PackageNotFoundError:
             versions[name] = None
-    return {"baker": versions.pop("baker"), "python": platform.python_version(), **versions}
+    return {"baker": BAKER_VERSION, "python": platform.python_version(), **versions}
 
 
 def _relative(path: Path | None, out: Path) -> str | None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from datetime import datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from baker.core.lightmap import BakeResult, ChannelDescription, Lightmap, TexelS
 from baker.core.progress import Progress, report, silent
 from baker.core.scene import SceneWarning
 from baker.core.stage import Stage
+from baker.core.version import VERSION
 from baker.io.bake.manifest import make_manifest, manifest_text
 from baker.io.bake.output_folder import MANIFEST_NAME, OutputFolder, check_out
 from baker.io.gltf.write_baked import make_glb
@@ -275,4 +275,4 @@ def _write_data(folder: Path, name: str, data: bytes) -> dict[str, Any]:
 
 
 def _signature() -> str:
-    return f"baker {version('baker')}"
+    return f"baker {VERSION}"

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from baker.core.atlas import Atlas, InstanceLayout
 from baker.core.errors import InputError
 from baker.core.scene import Instance, Mesh, Scene, SourceDocument
+from baker.core.version import VERSION
 from baker.io.gltf.accessor_bytes import gather_rows
 from baker.io.gltf.ao_materials import BakedUse, add_ao_textures, assign_materials, reads_texcoord_1
 from baker.io.gltf.build_document import new_document
@@ -299,7 +299,7 @@ def _write_version(document: Json) -> None:
     """Write the version of baker to `asset.extras.baker`, unless `extras` exists and is no object."""
     extras = document.setdefault("asset", {"version": "2.0"}).setdefault("extras", {})
     if isinstance(extras, dict):
-        extras["baker"] = {"version": version("baker")}
+        extras["baker"] = {"version": VERSION}
 
 
 def _mentions(node: Any, name: str) -> bool:

@@ -1,0 +1,5 @@
+"""Runs the command `baker` for `python -m baker`."""
+
+from baker.cli.app import main
+
+main()
