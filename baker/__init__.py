@@ -14,7 +14,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from baker.core.version import VERSION as __version__
+from baker.core.version import VERSION
 
 if TYPE_CHECKING:
     from baker.api.bakes import ao, bake, export, save
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from baker.verification.verify import VerifyReport
     from baker.viewer.server import ViewServer
 
+__version__ = VERSION
 
 # Names of the API by the module that defines them.
 _HOMES = {

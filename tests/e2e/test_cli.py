@@ -5,15 +5,18 @@ from __future__ import annotations
 import errno
 import io
 import json
+import os
 import subprocess
 import sys
 import time
+import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 from typing import get_args
 
 import pytest
 
+import baker
 from baker.cli.app import run
 from baker.cli.progress import Reporter
 from baker.core.encoding import encoding_options
@@ -306,8 +309,40 @@ def test_inspect_prints_text_and_json(monkeypatch, command):
 
 
 def test_version(command):
-    assert command("--version")[1].startswith("baker ")
-    assert set(json.loads(command("--version", "--json")[1])) == {"version"}
+    assert command("--version")[1] == command("-V")[1] == f"baker {baker.__version__}\n"
+    assert json.loads(command("--version", "--json")[1]) == {"version": baker.__version__}
+
+
+def test_python_m_baker_is_the_command():
+    done = subprocess.run([sys.executable, "-m", "baker", "-V"], capture_output=True, text=True, check=True)
+    assert done.stdout == f"baker {baker.__version__}\n"
+
+
+def test_the_project_has_a_name_of_its_own_and_one_command():
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8"))["project"]
+    assert project["name"] == "baker-lightmaps"
+    assert project["scripts"] == {"baker": "baker.cli.app:main"}
+
+
+def test_help_of_a_command_has_two_spellings(command, capsys):
+    for words in (("help", "verify"), ("verify", "--help")):
+        assert command(*words)[0] == 0
+        assert "Usage: baker verify" in capsys.readouterr().out
+    assert command("help")[0] == 0
+    assert "baker help COMMAND" in capsys.readouterr().out
+    assert command("help", "verfy")[0] == 2
+    assert "'verfy'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "at", "offered"), [("baker ve", 1, "verify"), ("baker bake --resol", 2, "--resolution")]
+)
+def test_a_shell_completes_commands_and_flags(words, at, offered):
+    asked = {**os.environ, "_BAKER_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(at)}
+    done = subprocess.run(
+        [sys.executable, "-m", "baker"], capture_output=True, text=True, check=True, env=asked
+    )
+    assert done.stdout.split() == [offered]
 
 
 def test_plain_progress_is_a_line_now_and_then():

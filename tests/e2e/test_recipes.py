@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -132,3 +133,41 @@ def test_the_lines_of_a_pipeline(game, tmp_path, recipe):
 def shell(folder, lines, limits=LIMITS):
     """Run shell lines with the options of both services: stop at the first line that fails."""
     return run(folder, "bash", "-eo", "pipefail", "-c", lines, VERIFY=QUICK, LIMITS=limits)
+
+
+def dockerfile():
+    """Return the instructions of the Dockerfile as (word, rest), with continued lines joined."""
+    lines = (RECIPES / "Dockerfile").read_text("utf-8").splitlines()
+    text = re.sub(r"\\\n\s*", "", "\n".join(line for line in lines if not line.startswith("#")))
+    return [tuple(line.split(maxsplit=1)) for line in text.splitlines() if line]
+
+
+def test_the_image_gets_all_that_the_install_needs():
+    copied = [rest.split() for word, rest in dockerfile() if word == "COPY"]
+    names = {name for *names, _ in copied for name in names}
+    assert all((ROOT / name).exists() for name in names)
+    assert names >= {"pyproject.toml", "README.md", "LICENSE", "baker", "cli"}
+    words = [word for word, _ in dockerfile()]
+    assert words[0] == "FROM"
+    assert set(words) == {"FROM", "ENV", "COPY", "RUN", "WORKDIR", "ENTRYPOINT"}
+
+
+def test_the_commands_of_the_image(tmp_path):
+    install, times, warm = (rest for word, rest in dockerfile() if word == "RUN")
+    assert re.fullmatch(r"pip install .* --no-compile /src", install)
+
+    # Numba and Python compare the time of a source file with the one that they stored.
+    (tmp_path / "baker").mkdir()
+    (tmp_path / "baker" / "a.py").write_text("x = 1\n")
+    code, said = run(tmp_path, "sh", "-ec", re.sub(r'^cd ".*?" &&', "", times))
+    assert code == 0, said
+    assert (tmp_path / "baker" / "a.py").stat().st_mtime == 1577836800.0
+    assert len(list((tmp_path / "baker" / "__pycache__").iterdir())) == 1
+
+    # The kernels of the tests are used, so the folder of Numba stays as it is.
+    for old, new in (("/src", str(ROOT)), ("/tmp/warm", "warm"), ('"$NUMBA_CACHE_DIR"', "cache")):
+        assert old in warm
+        warm = warm.replace(old, new)
+    code, said = run(tmp_path, "sh", "-ec", warm)
+    assert (code, said) == (0, "")
+    assert {path.name for path in tmp_path.iterdir()} == {"baker", "cache"}
