@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from baker.cli.command import Cluster, Run, command
-from baker.core.settings import BakeSettings
+from baker.core.settings import BAKE, BakeSettings
+from baker.core.settings_model import FILES
 from baker.io.formats import scene_file_help
 
 if TYPE_CHECKING:
@@ -17,7 +18,9 @@ if TYPE_CHECKING:
 
 Scene = Annotated[Path, typer.Argument(metavar="SCENE", help=scene_file_help())]
 Out = Annotated[Path, typer.Option("--out", "-o", metavar="OUT", help="Folder to write.")]
-Force = Annotated[bool, typer.Option("--force", help="Replace OUT even if baker did not write it.")]
+Force = Annotated[
+    bool, typer.Option("--force", help="Replace OUT even if baker did not write it.", rich_help_panel=FILES)
+]
 
 
 def bake_command(
@@ -59,4 +62,4 @@ def _tile_executor(address: str, threads: int | None) -> TileExecutor:
     return DistributedTileExecutor(Connection(address, threads=thread_count(threads)))
 
 
-bake = command("bake", BakeSettings)(bake_command)
+bake = command("bake", BakeSettings, common=BAKE)(bake_command)

@@ -12,8 +12,9 @@ import typer
 from typer.core import TyperCommand
 
 from baker.cli.commands import COMMANDS
-from baker.cli.fields import flag_of, help_of, is_repeated, is_switch, metavar_of
+from baker.cli.fields import choices_of, flag_of, group_of, help_of, is_repeated, is_switch, metavar_of
 from baker.cli.flags import FlagStream
+from baker.cli.help import RUN, usage_pieces, write_options
 from baker.cli.outputs import check_paths
 from baker.core.errors import SettingsError
 from baker.core.settings_model import Settings
@@ -71,22 +72,41 @@ class Run:
 _COMMON: list[tuple[str, Any, Any]] = [
     (
         "as_json",
-        Annotated[bool, typer.Option("--json", help="One JSON object on stdout; text goes to stderr.")],
+        Annotated[
+            bool,
+            typer.Option(
+                "--json", help="One JSON object on stdout; text goes to stderr.", rich_help_panel=RUN
+            ),
+        ],
         False,
     ),
-    ("quiet", Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")], False),
+    (
+        "quiet",
+        Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.", rich_help_panel=RUN)],
+        False,
+    ),
     (
         "verbose",
         Annotated[
             int,
             typer.Option(
-                "--verbose", "-v", count=True, show_default=False, help="Print more; -vv shows tracebacks."
+                "--verbose",
+                "-v",
+                count=True,
+                show_default=False,
+                help="Print more; -vv shows tracebacks.",
+                rich_help_panel=RUN,
             ),
         ],
         0,
     ),
 ]
-_CONFIG = Annotated[Path | None, typer.Option("--config", metavar="FILE", help="TOML file of settings.")]
+_CONFIG = Annotated[
+    Path | None,
+    typer.Option("--config", metavar="FILE", help="TOML file of settings.", rich_help_panel=RUN),
+]
+# Flag of every subcommand that `_SettingsCommand.parse_args` reads.
+_HELP_ALL = Annotated[bool, typer.Option("--help-all", help="Describe all options and exit.")]
 
 # The flag `--cluster`, for subcommands that can use more than one machine.
 Cluster = Annotated[
@@ -95,12 +115,13 @@ Cluster = Annotated[
         "--cluster",
         metavar="ADDRESS",
         help="Work on a dask.distributed cluster: tcp://HOST:8786, or local:N for N processes here.",
+        rich_help_panel=RUN,
     ),
 ]
 
 
 def command(
-    name: str, *models: type[Settings], fixed: dict[str, Any] | None = None
+    name: str, *models: type[Settings], fixed: dict[str, Any] | None = None, common: str = ""
 ) -> Callable[[Callable[..., None]], Callable[[], Any]]:
     """Return a decorator that makes a subcommand of a function with a typer signature.
 
@@ -113,6 +134,8 @@ def command(
         the first model. If a model has a table of the configuration file, the flag `--config` is added.
     fixed : dict, optional
         Settings with a fixed value. They have no flag.
+    common : str
+        Group of settings that the help lists among the common options.
 
     Returns
     -------
@@ -124,11 +147,16 @@ def command(
 
     def decorate(work: Callable[..., None]) -> Callable[[], Any]:
         def make() -> Any:
-            app = typer.Typer(add_completion=False, context_settings={"help_option_names": ["-h", "--help"]})
+            app = typer.Typer(
+                add_completion=False,
+                rich_markup_mode=None,
+                context_settings={"help_option_names": ["-h", "--help"]},
+            )
             app.command(name, cls=_SettingsCommand, help=COMMANDS[name])(work)
             made = typer.main.get_command(app)
             assert isinstance(made, _SettingsCommand)
             made.add_settings(models, fixed)
+            made.common = common
             return made
 
         return make
@@ -141,6 +169,8 @@ class _SettingsCommand(TyperCommand):
 
     models: tuple[type[Settings], ...] = ()
     fixed: dict[str, Any]
+    common: str = ""
+    _help_all = False
 
     def add_settings(self, models: tuple[type[Settings], ...], fixed: dict[str, Any]) -> None:
         """Append the flags of `models`, except the settings `fixed`, and the flags of every subcommand."""
@@ -157,7 +187,7 @@ class _SettingsCommand(TyperCommand):
         ]
         flags += [(name, _annotation(name, fields[name]), None) for name in ordered]
         # typer makes flags from a signature. Make a dataclass, because its signature consists of its fields.
-        holder = make_dataclass("Flags", [*flags, *_COMMON], kw_only=True)
+        holder = make_dataclass("Flags", [*flags, *_COMMON, ("help_all", _HELP_ALL, False)], kw_only=True)
         app = typer.Typer(add_completion=False)
         app.command()(holder)
         self.params += typer.main.get_command(app).params
@@ -165,6 +195,8 @@ class _SettingsCommand(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the arguments; an empty one for a path is refused, since `Path("")` is the current folder."""
+        if "--help-all" in args:
+            self._help_all, args = True, ["--help"]
         paths = {
             flag
             for p in cast("list[Any]", self.params)
@@ -178,6 +210,14 @@ class _SettingsCommand(TyperCommand):
                 raise SettingsError(f"{name} empty; name a file or a folder ('.' is the current folder)")
         return super().parse_args(ctx, args)
 
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """Return the words of the usage line."""
+        return usage_pieces(self, ctx)
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write the options of the help."""
+        write_options(ctx, formatter, common=self.common, complete=self._help_all)
+
     def invoke(self, ctx: Any) -> Any:
         """Combine settings from all sources, and call the function of the subcommand."""
         from baker.cli.config import resolve
@@ -186,6 +226,7 @@ class _SettingsCommand(TyperCommand):
         values = ctx.params
         given = {name: values.pop(name, None) for name in self.flag_names}
         config = given.pop("config", None)
+        values.pop("help_all")
         check_paths(str(self.name), values, config)
         given = {name: value for name, value in given.items() if value not in (None, [], ())}
         ctx.obj = Run(
@@ -202,9 +243,25 @@ class _SettingsCommand(TyperCommand):
 def _annotation(name: str, field: Any) -> Any:
     """Return the type annotation of a flag for typer. Values are text or None; the model validates them."""
     if is_switch(field):
-        option = typer.Option(flag_of(name, field), help=help_of(field), show_default=False)
+        option = typer.Option(
+            flag_of(name, field), help=help_of(field), show_default=False, rich_help_panel=group_of(field)
+        )
         return Annotated[bool | None, option]
     option = typer.Option(
-        flag_of(name, field), help=help_of(field), metavar=metavar_of(field), show_default=False
+        flag_of(name, field),
+        help=help_of(field),
+        metavar=metavar_of(field),
+        show_default=False,
+        autocompletion=_completer(choices_of(field)),
+        rich_help_panel=group_of(field),
     )
     return Annotated[list[str] | None if is_repeated(field) else str | None, option]
+
+
+def _completer(choices: list[str]) -> Callable[[str], list[str]]:
+    """Return the function with which a shell completes the value of a flag."""
+
+    def complete(incomplete: str) -> list[str]:
+        return [choice for choice in choices if choice.startswith(incomplete)]
+
+    return complete

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
 # `field` is a pydantic FieldInfo. It is annotated as Any, because only `core.settings_model` imports
@@ -40,6 +41,11 @@ def unit_of(field: Any) -> str:
     return _extra(field, "unit") or ""
 
 
+def group_of(field: Any) -> str:
+    """Return the title of a setting's group in the help, empty for the common options of a command."""
+    return _extra(field, "group") or ""
+
+
 def kinds_of(field: Any) -> list[Any]:
     """Return the types that the value of a setting may have, without None; for a Literal, its choices."""
     kinds: list[Any] = []
@@ -60,8 +66,13 @@ def kinds_of(field: Any) -> list[Any]:
     return kinds
 
 
+def choices_of(field: Any) -> list[str]:
+    """Return the values that a setting with few possible values may have, else an empty list."""
+    return [kind for kind in kinds_of(field) if isinstance(kind, str)]
+
+
 def metavar_of(field: Any) -> str:
-    """Return the placeholder for the value of a setting in the help: `N`, `X`, `a|b` or `TEXT`."""
+    """Return the placeholder for the value of a setting in the help: `N`, `NUMBER`, `a|b` or `TEXT`."""
     metavar = _extra(field, "metavar")
     if metavar:
         return str(metavar)
@@ -70,7 +81,7 @@ def metavar_of(field: Any) -> str:
         return "|".join(kinds)
     if kinds[0] is tuple:
         return "NAME,..."
-    return {int: "N", float: "X"}.get(kinds[0], "TEXT")
+    return {int: "N", float: "NUMBER", Path: "PATH"}.get(kinds[0], "TEXT")
 
 
 def is_switch(field: Any) -> bool:

@@ -9,6 +9,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from baker.cli.commands import COMMANDS
+from baker.cli.help import write_options
 from baker.core.version import VERSION
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ class LazyGroup(TyperGroup):
         return list(COMMANDS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Import and return a subcommand. While the help is written, return a placeholder instead."""
+        """Import and return a subcommand. While a shell completes its name, return a placeholder instead."""
         if cmd_name not in COMMANDS:
             return None
         if self._listing:
@@ -36,17 +37,23 @@ class LazyGroup(TyperGroup):
 
     _listing = False
 
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Write the help, without importing any subcommand."""
+    def shell_complete(self, ctx: Any, incomplete: str) -> Any:
+        """Return the words that complete a subcommand, without importing any subcommand."""
         self._listing = True
-        super().format_help(ctx, formatter)
-        self._listing = False
+        return super().shell_complete(ctx, incomplete)
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write the options and the subcommands of the help, without importing any subcommand."""
+        write_options(ctx, formatter)
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
 
 
 def make_app() -> Any:
     """Return the command `baker` with all its subcommands."""
     app = typer.Typer(
         cls=LazyGroup,
+        rich_markup_mode=None,
         context_settings={"help_option_names": ["-h", "--help"]},
         epilog="`baker help COMMAND` or `baker COMMAND --help` describes a command.",
     )

@@ -13,6 +13,7 @@ from baker.core.encoding import encoding_options, encodings_in_words
 from baker.core.errors import SettingsError
 from baker.core.light_limits import BRIGHTEST
 from baker.core.settings_model import (
+    FILES,
     Names,
     Numbers,
     RunSettings,
@@ -24,6 +25,9 @@ from baker.core.settings_model import (
     threads_setting,
 )
 
+# Groups of the settings, in the help. `BAKE` has the ones that most bakes set.
+BAKE, LIGHT, OCCLUSION = "Bake", "Light and noise", "Ambient occlusion"
+PAGES, SCENE = "Lightmap uv and pages", "Scene"
 # Hemisphere rays per texel of each preset. They are also the default of `light_samples` and `ao_samples`.
 QUALITY_SAMPLES = {"preview": 16, "medium": 64, "high": 256, "ultra": 1024}
 
@@ -33,55 +37,83 @@ class CommonSettings(Settings):
 
     table: ClassVar[str] = "bake"
 
-    channels: Names = setting(("irradiance", "ao"), "Channels to bake.")
-    resolution: int = setting(1024, "Width and height of each page.", unit="texels", ge=16, le=16384)
+    channels: Names = setting(("irradiance", "ao"), "Channels to bake.", group=FILES)
+    resolution: int = setting(
+        1024, "Width and height of each page.", unit="texels", ge=16, le=16384, group=BAKE
+    )
     density: float | None = setting(
-        None, "Texels per metre; adds pages as needed.", unit="texels/m", gt=0, allow_inf_nan=False
+        None,
+        "Texels per metre; adds pages as needed.",
+        unit="texels/m",
+        gt=0,
+        allow_inf_nan=False,
+        group=BAKE,
     )
-    max_pages: int = setting(16, "Largest number of pages if `density` is set.", ge=1, le=256)
-    padding: int = setting(4, "Empty texels between charts.", unit="texels", ge=0, le=64)
+    max_pages: int = setting(16, "Largest number of pages if `density` is set.", ge=1, le=256, group=PAGES)
+    padding: int = setting(4, "Empty texels between charts.", unit="texels", ge=0, le=64, group=PAGES)
     uv: Literal["auto", "keep", "unwrap"] = setting(
-        "auto", "Keep TEXCOORD_1 as lightmap uv, or unwrap; `auto` keeps it if it is valid."
+        "auto", "Keep TEXCOORD_1 as lightmap uv, or unwrap; `auto` keeps it if it is valid.", group=PAGES
     )
-    unwrapper: Literal["xatlas"] = setting("xatlas", "Library that cuts surfaces into charts and packs them.")
+    unwrapper: Literal["xatlas"] = setting(
+        "xatlas", "Library that cuts surfaces into charts and packs them.", group=PAGES
+    )
     quality: Literal["preview", "medium", "high", "ultra"] = setting(
-        "medium", "Preset of `samples`: preview 16, medium 64, high 256, ultra 1024."
+        "medium", "Preset of `samples`: preview 16, medium 64, high 256, ultra 1024.", group=BAKE
     )
-    samples: int | None = setting(None, "Hemisphere rays per texel; default: by `quality`.", ge=1, le=65536)
-    light_samples: int | None = setting(None, "Shadow rays per texel; default: `samples`.", ge=1, le=65536)
-    ao_samples: int | None = setting(None, "AO rays per texel; default: `samples`.", ge=1, le=65536)
+    samples: int | None = setting(
+        None, "Hemisphere rays per texel; default: by `quality`.", ge=1, le=65536, group=LIGHT
+    )
+    light_samples: int | None = setting(
+        None, "Shadow rays per texel; default: `samples`.", ge=1, le=65536, group=LIGHT
+    )
+    ao_samples: int | None = setting(
+        None, "AO rays per texel; default: `samples`.", ge=1, le=65536, group=OCCLUSION
+    )
     ao_distance: Text = setting(
-        "10%", "Maximum distance of AO: metres, `10%` of the scene's diagonal, or `inf`.", unit="m"
+        "10%",
+        "Maximum distance of AO: metres, `10%` of the scene's diagonal, or `inf`.",
+        unit="m",
+        group=OCCLUSION,
+        metavar="DISTANCE",
     )
-    sky: Numbers | None = setting(None, "Sky radiance R,G,B in cd/m2.", unit="cd/m2")
-    sky_strength: float = setting(1.0, "Factor of the sky radiance.", ge=0, allow_inf_nan=False)
+    sky: Numbers | None = setting(
+        None, "Sky radiance R,G,B in cd/m2.", unit="cd/m2", group=BAKE, metavar="R,G,B"
+    )
+    sky_strength: float = setting(1.0, "Factor of the sky radiance.", ge=0, allow_inf_nan=False, group=LIGHT)
     bounces: int | None = setting(
-        None, "Number of reflections of light; default: until converged.", ge=0, le=1000
+        None, "Number of reflections of light; default: until converged.", ge=0, le=1000, group=LIGHT
     )
-    denoise: bool = setting(True, "Denoise with Open Image Denoise.")
-    encode: Names = setting((), f"Additional file formats of each page: {encodings_in_words()}.")
+    denoise: bool = setting(True, "Denoise with Open Image Denoise.", group=LIGHT)
+    encode: Names = setting((), f"Additional file formats of each page: {encodings_in_words()}.", group=FILES)
     export: Names = setting(
-        (), "Engines to add a folder for: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md."
+        (),
+        "Engines to add a folder for: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md.",
+        group=BAKE,
     )
     include: Names = setting(
         (),
         "Bake only objects with these node names or node paths; `*` and `?` are wildcards.",
         repeated=True,
+        group=SCENE,
     )
     exclude: Names = setting(
         (),
         "Leave out objects and lights with these node names or node paths, and their descendants.",
         repeated=True,
+        group=SCENE,
     )
-    up: Literal["y", "z"] = setting("y", "Up axis of files in formats that do not specify it.")
+    up: Literal["y", "z"] = setting("y", "Up axis of files in formats that do not specify it.", group=SCENE)
     scale: float = setting(
         1.0,
         "Metres per unit of files in formats that do not specify it.",
         unit="m",
         gt=0,
         allow_inf_nan=False,
+        group=SCENE,
     )
-    allow_outside: bool = setting(False, "Also read referenced files outside the scene's folder.")
+    allow_outside: bool = setting(
+        False, "Also read referenced files outside the scene's folder.", group=SCENE
+    )
     seed: int = seed_setting()
     threads: int | None = threads_setting()
 

@@ -18,6 +18,8 @@ from baker.core.names import unknown_name
 
 # Number of characters of an invalid value that an error quotes.
 _LONGEST = 80
+# Groups of settings in the help: those that every command has, and those of the files that a bake writes.
+RUN, FILES = "Run", "Files"
 
 
 def setting(
@@ -26,6 +28,7 @@ def setting(
     *,
     unit: str = "",
     metavar: str = "",
+    group: str = "",
     repeated: bool = False,
     **bounds: Any,
 ) -> Any:
@@ -41,6 +44,8 @@ def setting(
         Unit of the value; empty for values without a unit.
     metavar : str
         Placeholder of the value in the help; by default, it is derived from the type.
+    group : str
+        Title in the help above this setting and related ones; empty for the common options of a command.
     repeated : bool
         Whether the flag may be given several times, in which case its values are concatenated.
     **bounds : object
@@ -51,7 +56,7 @@ def setting(
     FieldInfo
         Declared as Any, so that the field can be annotated with the type of its value.
     """
-    extra: dict[str, Any] = {"unit": unit, "metavar": metavar, "repeated": repeated}
+    extra: dict[str, Any] = {"unit": unit, "metavar": metavar, "group": group, "repeated": repeated}
     return Field(default, description=description, json_schema_extra=extra, **bounds)
 
 
@@ -210,7 +215,7 @@ def seed_setting() -> Any:
     FieldInfo
         For `seed: int`.
     """
-    return setting(0, "Seed of all random numbers.", ge=0, le=2**31 - 1)
+    return setting(0, "Seed of all random numbers.", group=RUN, ge=0, le=2**31 - 1)
 
 
 def threads_setting() -> Any:
@@ -221,7 +226,7 @@ def threads_setting() -> Any:
     FieldInfo
         For `threads: int | None`.
     """
-    return setting(None, "Number of threads; default: all cores.", ge=1, le=1024)
+    return setting(None, "Number of threads; default: all cores.", group=RUN, ge=1, le=1024)
 
 
 class RunSettings(Settings):

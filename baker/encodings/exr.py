@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels
 from baker.core.errors import InputError, ResourceError
-from baker.core.settings_model import setting
+from baker.core.settings_model import FILES, setting
 
 # Largest finite value of a 16-bit half float.
 HALF_MAX = 65504.0
@@ -192,8 +192,8 @@ def _silent_library() -> Iterator[None]:
 class ExrOptions(EncodingOptions):
     """Options of EXR files: number format and compression."""
 
-    dtype: Literal["half", "float"] = setting("half", "Number format of the EXR files.")
-    exr_compression: Literal["zip", "piz"] = setting("zip", "Compression of the EXR files.")
+    dtype: Literal["half", "float"] = setting("half", "Number format of the EXR files.", group=FILES)
+    exr_compression: Literal["zip", "piz"] = setting("zip", "Compression of the EXR files.", group=FILES)
 
 
 class ExrEncoding(Encoding[ExrOptions]):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels, write_image
 from baker.core.errors import InputError, SettingsError
-from baker.core.settings_model import Text, setting
+from baker.core.settings_model import FILES, Text, setting
 from baker.io.png import decode_png, encode_png
 
 GAMMA = 2.2
@@ -27,7 +27,11 @@ class RgbmOptions(EncodingOptions):
     """The irradiance that is stored as R = G = B = A = 255."""
 
     rgbm_range: Text = setting(
-        "auto", "Largest irradiance that RGBM can store, lx; `auto` uses the brightest texel.", unit="lx"
+        "auto",
+        "Largest irradiance that RGBM can store, lx; `auto` uses the brightest texel.",
+        unit="lx",
+        group=FILES,
+        metavar="LX|auto",
     )
 
     def check(self) -> None:

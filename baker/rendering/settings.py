@@ -58,6 +58,7 @@ class RenderSettings(Settings):
         None,
         "Largest distance of occluders for `ao`: metres, `10%` of the scene's diagonal, or `inf`.",
         unit="m",
+        metavar="DISTANCE",
     )
     aov: Names = setting((), "Further layers: albedo, normal, depth.")
     denoise: bool = setting(False, "Run Open Image Denoise over the picture.")
@@ -70,6 +71,7 @@ class RenderSettings(Settings):
         None,
         "Sky radiance R,G,B in cd/m2. Default: black; with `lightmap`, the sky of the bake.",
         unit="cd/m2",
+        metavar="R,G,B",
     )
     sky_strength: float = same_setting(BakeSettings, "sky_strength")
     allow_outside: bool = same_setting(BakeSettings, "allow_outside")

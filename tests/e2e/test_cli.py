@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import errno
+import importlib
 import io
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -18,6 +20,8 @@ import pytest
 
 import baker
 from baker.cli.app import run
+from baker.cli.commands import COMMANDS
+from baker.cli.fields import group_of
 from baker.cli.progress import Reporter
 from baker.core.encoding import encoding_options
 from baker.core.errors import Cancelled, InputError, SettingsError
@@ -334,8 +338,50 @@ def test_help_of_a_command_has_two_spellings(command, capsys):
     assert "'verfy'" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_help_of_a_command_fits_80_columns_and_breaks_no_name(name, command, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert command(name, "--help-all")[0] == 0
+    text = capsys.readouterr().out
+    assert max(map(len, text.splitlines())) <= 80
+    # No type names of Python or typer, and no placeholder that says nothing.
+    assert not re.search(r"<\w+>|\bTEXT\b|\bX\b|\{", text)
+    made = getattr(importlib.import_module(f"baker.cli.{name}"), name)()
+    words = set(re.split(r"[\s,()]+", text))
+    for option in made.params:
+        if option.param_type_name == "option":
+            assert {*option.opts, *option.secondary_opts} <= words
+            assert option.is_flag or option.count or f" {option.metavar}" in text, option.metavar
+    # Two columns: a description begins where all of its group begin.
+    for group in text.split("\n\n"):
+        rows = [line for line in group.splitlines() if re.match(r"  -\S.* {2,}\S", line)]
+        assert len({re.match(r"  \S+( \S+)* {2,}", row).end() for row in rows}) <= 1
+
+
+def test_the_common_options_come_first_and_the_others_are_named(command, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert command("bake", "--help")[0] == 0
+    short = capsys.readouterr().out
+    assert command("bake", "--help-all")[0] == 0
+    complete = capsys.readouterr().out
+    common = short[short.index("Common options:") : short.index("More options")]
+    described = re.findall(r"^  (?:-\w, )?(--[\w-]+)", common, re.MULTILINE)
+    first = ["--out", "--resolution", "--density", "--quality", "--sky", "--export"]
+    assert described == [*first, "--help-all", "--help"]
+    assert common in complete
+    assert short.count("\n") < 40
+    for name in BakeSettings.model_fields:
+        assert f"--{name.replace('_', '-')}" in short.split()
+        assert group_of(BakeSettings.model_fields[name])
+
+
 @pytest.mark.parametrize(
-    ("words", "at", "offered"), [("baker ve", 1, "verify"), ("baker bake --resol", 2, "--resolution")]
+    ("words", "at", "offered"),
+    [
+        ("baker ve", 1, "verify"),
+        ("baker bake --resol", 2, "--resolution"),
+        ("baker bake --quality pr", 3, "preview"),
+    ],
 )
 def test_a_shell_completes_commands_and_flags(words, at, offered):
     asked = {**os.environ, "_BAKER_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(at)}
