@@ -165,7 +165,12 @@ def test_the_commands_of_the_image(tmp_path):
     assert len(list((tmp_path / "baker" / "__pycache__").iterdir())) == 1
 
     # The kernels of the tests are used, so the folder of Numba stays as it is.
-    for old, new in (("/src", str(ROOT)), ("/tmp/warm", "warm"), ('"$NUMBA_CACHE_DIR"', "cache")):
+    for old, new in (
+        ("interior", "cornell"),
+        ("/src", str(ROOT)),
+        ("/tmp/warm", "warm"),
+        ('"$NUMBA_CACHE_DIR"', "cache"),
+    ):
         assert old in warm
         warm = warm.replace(old, new)
     code, said = run(tmp_path, "sh", "-ec", warm)
