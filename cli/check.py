@@ -35,9 +35,9 @@ class _Checked:
     unreadable : list of Unreadable
         One for each scene that could not be read.
     request : FixRequest or None
-        The request of `--fix` or `--repair`.
+        The request of `--fix` or `--repair`; None without these flags.
     fixed : FixResult or None
-        Its result.
+        The result of the request.
     """
 
     reports: list[CheckReport]

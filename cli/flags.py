@@ -17,7 +17,7 @@ _NAMED = re.compile(r"`([a-z][a-z0-9_]*)(?:=([^`\s]+))?`")
 _ARGUMENTS = frozenset({
     "cluster", "config", "fix", "force", "junit", "out", "port", "report", "sarif", "three",
 })  # fmt: skip
-# Flags of arguments whose flag has another name.
+# Arguments whose flag is not `--` followed by their name.
 _SHORT = {"out": "-o"}
 # This argument has the same name as an export, so it is converted only if it has a value.
 _AMBIGUOUS = "three"

@@ -1,4 +1,4 @@
-"""What an interrupted command writes; needs nothing that would first have to be imported."""
+"""Writes the message of an interrupted command. Only `os` is imported, so that this works at any time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ INTERRUPTED = 130
 
 
 def report_interrupt(argv: list[str]) -> None:
-    """Write the message of an interrupted command, and with `--json` its object.
+    """Write the message of an interrupted command to stderr, and with `--json` the error object to stdout.
 
     Parameters
     ----------
@@ -24,4 +24,4 @@ def report_interrupt(argv: list[str]) -> None:
         try:
             os.write(descriptor, text)
         except OSError:
-            continue  # closed, or the reader is gone
+            continue  # the stream is closed, or its reader has ended

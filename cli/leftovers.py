@@ -29,7 +29,7 @@ def survey(out: str) -> bytes:
 
 
 def restore(note: bytes) -> None:
-    """Restore the output path, and remove temporary files and folders that the command made.
+    """Restore the old content of an output path, and remove temporary files of the command and empty folders.
 
     Parameters
     ----------

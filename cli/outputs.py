@@ -1,4 +1,4 @@
-"""Which arguments of commands are files to write, and the check that they replace no input."""
+"""Finds the output paths among the arguments of a command, and refuses those that would replace an input."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-# Options that name a file or a folder to write. Every other path is an input.
+# Arguments that name a file or a folder to write. Every other path is an input.
 OUTPUTS = frozenset({"junit", "out", "report", "sarif"})
-# Commands take the folder of a bake as the argument `out`, too: it is an input there.
+# Commands whose argument `out` is the folder of an existing bake, which they only read.
 _READ = frozenset({"verify", "view"})
 
 
@@ -25,11 +25,11 @@ def check_paths(command: str, values: Mapping[str, Any], config: Path | None) ->
     Parameters
     ----------
     command : str
-        Its name.
+        Name of the command.
     values : mapping of str to object
         Arguments of the command by name.
     config : Path or None
-        File of settings.
+        The configuration file, which is also an input.
     """
     names = output_names(command)
     outputs = {name: path for name, path in values.items() if name in names and isinstance(path, Path)}
@@ -41,17 +41,17 @@ def check_paths(command: str, values: Mapping[str, Any], config: Path | None) ->
     for name, value in values.items():
         paths = value if isinstance(value, list | tuple) else [value]
         inputs += [path for path in paths if name not in outputs and isinstance(path, Path)]
-    # An output that does not exist replaces nothing, and most do not.
+    # Search the scenes only if an output exists, because a new output cannot replace an input.
     exists = any(os.path.lexists(path) for path in outputs.values())
     check_outputs(outputs, _scenes(command, inputs) if exists else [])
 
 
 def _scenes(command: str, inputs: list[Path]) -> list[Path]:
-    """Return the inputs, and the scenes that folders, patterns and lists of jobs stand for."""
+    """Return the inputs, and the scene files that folders, patterns and job files among them refer to."""
     from baker.core.errors import BakerError
 
     found = list(inputs)
-    # The command itself reports what cannot be read.
+    # Ignore errors here, because the command reports unreadable inputs itself.
     with contextlib.suppress(BakerError, OSError, ValueError):
         if command == "check":
             from baker.checks.scenes import find_scenes

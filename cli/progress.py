@@ -26,11 +26,12 @@ class Reporter:
     quiet : bool
         Whether nothing is shown.
     stopped : callable
-        Returns whether a stopping signal has arrived. The callback returns this value.
+        A function without arguments that returns whether a stopping signal has arrived. A `Reporter` returns
+        its result, which cancels the work if it is true.
     stream : TextIO
         Stream on which progress is shown; by default stderr.
     clock : callable
-        Returns the time, seconds.
+        A function without arguments that returns the time, seconds.
     """
 
     def __init__(

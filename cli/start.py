@@ -1,4 +1,4 @@
-"""Where the command `baker` begins: handles Ctrl-C and missing streams before anything else is imported."""
+"""Entry point of the command `baker`: handles Ctrl-C and missing streams before it imports other modules."""
 
 from __future__ import annotations
 
@@ -23,14 +23,15 @@ def _end(number: int, frame: object) -> None:
     os._exit(INTERRUPTED)
 
 
-# At the import already: the time between it and the call of `main` counts, too.
+# Install the handler during the import, because Ctrl-C may arrive before `main` is called.
 signal.signal(signal.SIGINT, _end)
 
 
 def open_missing_streams() -> None:
     """Open the null device for each standard stream that was closed before this process started.
 
-    Otherwise the next file that is opened would be the stream, and would receive what libraries print.
+    Otherwise the next opened file would get the descriptor of this stream (0, 1 or 2), and libraries that
+    print would write into the file.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is not None:

@@ -43,7 +43,7 @@ def path_of(value: Any, name: str, what: str = "a path") -> Path:
     Raises
     ------
     SettingsError
-        If the value is neither a str nor a Path, or is empty.
+        If the value is neither a str nor an `os.PathLike`, or is empty.
     """
     if not isinstance(value, str | os.PathLike):
         raise wrong_type(name, what, value)
@@ -58,7 +58,7 @@ def instance_of(value: Any, kind: type[T], name: str, hint: str = "") -> T:
     Raises
     ------
     SettingsError
-        If it is not; the message ends with `hint`.
+        If it is not an instance of `kind`. The message ends with `hint`.
     """
     if not isinstance(value, kind):
         raise wrong_type(name, f"a baker.{kind.__name__}", value, hint)

@@ -82,7 +82,8 @@ def bake(
         denoise : bool, default True
             Denoise with Open Image Denoise.
         encode : str | Sequence[str], default ()
-            Additional file formats of each page: `hdr`, `rgbm` (colours); `png16`, `png8` (one value).
+            Additional file formats of each page: `hdr`, `rgbm` for maps with three colours; `png16`, `png8`
+            for maps with one value per texel.
         export : str | Sequence[str], default ()
             Engines to add a folder for: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md.
         include : str | Sequence[str], default ()
@@ -118,7 +119,7 @@ def bake(
     SettingsError
         For an unknown setting, a value out of range, or an atlas of another scene.
     ResourceError
-        If memory, disk or a library is missing.
+        If memory or disk space runs out, or a library is missing.
     Cancelled
         If `progress` returned a truthy value.
 
@@ -196,7 +197,7 @@ def ao(
     SettingsError
         For an unknown setting or a value out of range.
     ResourceError
-        If memory, disk or a library is missing.
+        If memory or disk space runs out, or a library is missing.
     Cancelled
         If `progress` returned a truthy value.
 

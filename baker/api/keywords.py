@@ -61,7 +61,8 @@ class BakeKeywords(TypedDict, total=False):
     # Denoise with Open Image Denoise.
     denoise: bool
 
-    # Additional file formats of each page: `hdr`, `rgbm` (colours); `png16`, `png8` (one value).
+    # Additional file formats of each page: `hdr`, `rgbm` for maps with three colours; `png16`,
+    # `png8` for maps with one value per texel.
     encode: str | Sequence[str]
 
     # Engines to add a folder for: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md.

@@ -72,7 +72,7 @@ def verify(
     SettingsError
         For an unknown setting, a value out of range, or a limit that cannot be parsed.
     ResourceError
-        If memory or a library is missing.
+        If memory runs out or a library is missing.
     Cancelled
         If `progress` returned a truthy value.
 
@@ -171,7 +171,7 @@ def render(
     scene : Scene, str or Path
         A scene file, or a result of `load`.
     settings : RenderSettings, optional
-        Camera, size, samples ...
+        Camera, size of the picture, number of paths and other settings.
     out : str or Path, optional
         EXR or PNG file to write.
     progress : Progress
@@ -228,7 +228,7 @@ def render(
     SettingsError
         For an unknown setting, a value out of range, or if `out` is not an EXR or PNG file.
     ResourceError
-        If memory, disk or a library is missing.
+        If memory or disk space runs out, or a library is missing.
     Cancelled
         If `progress` returned a truthy value.
 
@@ -281,7 +281,7 @@ def view(
     Raises
     ------
     InputError
-        If the folder contains no bake, or `three` is not three.js.
+        If the folder contains no bake, or `three` is not a copy of three.js.
     SettingsError
         If `port` is not an integer from 0 to 65535.
     ResourceError

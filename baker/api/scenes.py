@@ -77,7 +77,7 @@ def check(
     settings : CheckSettings, optional
         Which findings are ignored, which fail the check, and how cost is estimated.
     bake : BakeSettings, optional
-        Settings of the planned bake: resolution, padding, uv, sky ...
+        Settings of the planned bake, such as `resolution`, `padding`, `uv` and `sky`.
     progress : Progress
         Called with stage, fraction done and a detail as text; a truthy return value cancels.
     **keywords : Unpack[CheckKeywords]

@@ -1,6 +1,7 @@
 """Speed of bakes on this machine, read from the manifest of an earlier bake.
 
-The user names this bake, or it is the latest bake of the scene in a folder beside the scene file.
+The earlier bake is the one that the setting `rates` names, or else the latest bake of the scene in a folder
+beside the scene file.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from baker.io.regular_file import read_regular
 # Number of entries of the scene's folder that are searched for `bake.json`.
 # Size above which a manifest is not read, bytes.
 _MOST_FOLDERS, _MOST_BYTES = 200, 1 << 24
-# Stages whose time is proportional to the number of texels, to that of triangles, and to that of rays.
+# Stages grouped by the number to which their time is proportional: of texels, of triangles, or of rays.
 BY_TEXEL = (Stage.TEXELS, Stage.FINISH, Stage.WRITE, Stage.SOLVE)
 BY_TRIANGLE = (Stage.LOAD, Stage.UNWRAP, Stage.RAY_TREE)
 RAY_STAGES = (

@@ -1,4 +1,4 @@
-"""Radiance that each triangle emits: the exact mean of the emissive texture over it or its parts."""
+"""Radiance that triangles emit: the exact mean of the emissive texture over a triangle or over its parts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from baker.checks.world_triangles import WorldTriangles
 from baker.core.scene import Texture
 
-# Largest number of parts by which subdivision may exceed the number of textured triangles.
+# Triangles with an emissive texture are subdivided into parts. This is the largest difference between the
+# number of parts and the number of these triangles.
 _MOST_PARTS = 2048
 
 

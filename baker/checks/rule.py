@@ -1,7 +1,8 @@
-"""The registry of rules: one function for each code, with its severity, advice and documentation.
+"""The registry of rules, with the severity, advice and documentation of each rule.
 
-A rule is a function that takes a `CheckContext` and yields `RawFinding` objects. It is decorated with `check`
-and defined in a file of `baker/checks/rules/`. Its docstring is its section of docs/CHECKS.md: the first line
+A rule is a function that finds one kind of defect: it takes a `CheckContext` and yields `RawFinding` objects.
+The code of a rule is its name in reports, such as `zero-area-faces`. A rule is decorated with `check` and
+defined in a file of `baker/checks/rules/`. Its docstring is its section of docs/CHECKS.md: the first line
 names the defect, and the rest describes the effect of the defect and the test for it.
 """
 
@@ -26,7 +27,7 @@ class Check:
     Attributes
     ----------
     code : str
-        Name of the findings, the same in all versions.
+        Name of the rule and of its findings, the same in all versions.
     group : str
         Chapter of docs/CHECKS.md, one of `GROUPS`.
     severity : str
@@ -38,7 +39,9 @@ class Check:
     function : callable
         The rule itself.
     in_bake : bool
-        Whether `bake_warnings` also runs the rule in every bake.
+        Whether docs/CHECKS.md marks the rule with "in a bake". These are the rules that
+        `baker.checks.in_bake` runs in every bake. `light-range`, which it runs only in bakes of light, is
+        not marked.
     """
 
     code: str
@@ -74,7 +77,7 @@ def check(
     fix : str
         One line of advice, without a full stop.
     in_bake : bool
-        Whether `baker.checks.in_bake` calls the rule.
+        Whether docs/CHECKS.md marks the rule as part of every bake, see `Check`.
 
     Returns
     -------

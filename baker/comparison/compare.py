@@ -34,8 +34,8 @@ from baker.metrics.sample_texels import choose_texels
 from baker.metrics.texel_area import instance_map, one_surface_point
 from baker.metrics.worst_texels import worst_texels
 
-# Metrics on which `fail_if` may set limits. The noise of bake b is not known, so metrics that need the noise
-# of the reference are left out, and the energy ratio as well.
+# Metrics on which `fail_if` may set limits. Metrics that need the noise of the reference are left out,
+# because the noise of bake b is not known. The energy ratio is left out, because it is not computed here.
 LIMITED = (*(name for name in METRICS if not name.startswith(("noise", "z_", "energy"))), "flip")
 
 
@@ -70,11 +70,11 @@ class DiffReport(Result):
     channels : dict of str to ChannelDifference
         The channels that both bakes have, by name.
     objects : list of dict
-        Metrics of each object of a, as in the JSON.
+        Metrics of each object of bake a, in the form of `to_dict`.
     worst : list of dict
-        The texels with the largest errors, as in the JSON.
+        The texels with the largest errors, in the form of `to_dict`.
     differences : list of dict
-        Settings and other manifest entries that differ, as in the JSON.
+        Settings and other manifest entries that differ, in the form of `to_dict`.
     only_in_a, only_in_b : list of dict
         Name and node of the objects that have no counterpart in the other bake.
     unmatched : int
@@ -216,7 +216,7 @@ def compare(
 
 
 def _owners(bake: StoredBake, sides: ComparedSurfaces) -> NDArray[np.int32]:
-    """Return (P, H, W) int32: the instance of each texel of a that may be compared, -1 for other texels."""
+    """Return (P, H, W) int32: the instance of each texel of bake a, -1 for texels that are not compared."""
     owner = instance_map(sides.a, bake.atlas.n_pages, bake.atlas.resolution)
     covered = np.isin(bake.status, (TexelStatus.COVERED, TexelStatus.UNCONVERGED))
     return np.where(covered & ~sides.missing_a[owner], owner, -1).astype(np.int32)
@@ -227,9 +227,9 @@ def _choose(
 ) -> tuple[NDArray[np.int64], TrianglePoints, TrianglePoints, NDArray[np.int64]]:
     """Choose texels of bake a that have a matching surface point in bake b.
 
-    Returns the texels (n,) as (page * H + row) * W + column, their points on a and on b, and for each
-    instance of a the number of chosen texels without a matching point. This number is 0 for objects that b
-    lacks.
+    Returns the texels (n,) as (page * H + row) * W + column, their points on the surfaces of a and of b, and
+    for each instance of a the number of texels that had no matching point and were dropped. This number is 0
+    for objects that b lacks.
     """
     brightness = bake.maps[name].mean(axis=3, dtype=np.float64).reshape(-1)
     owner = owner.reshape(-1)

@@ -30,8 +30,8 @@ _LIFT = 0.01
 _ALIKE = 0.5
 # Largest number of hits that are tested along a ray.
 _LAYERS = 4
-# An object without a partner counts as present in the other bake if at least this share of its area matches
-# objects without a partner there.
+# Share of the area of an object without a partner. If at least this share matches objects without a partner
+# in the other bake, the object is not reported as missing there.
 _PRESENT = 0.5
 
 
@@ -160,8 +160,9 @@ def _missing(
 ) -> NDArray[np.bool_]:
     """Return (I,) bool: the instances of `rest` that have no counterpart among `other_rest`.
 
-    An instance has a counterpart if enough of its area matches. The area of a triangle matches if its
-    centroid does.
+    `rest` and `other_rest` are the instances without a partner of `geometry` and of `other`. An instance has
+    a counterpart if at least the share `_PRESENT` of its area matches. The area of a triangle matches if its
+    centroid matches.
     """
     missing = np.zeros(n_instances, bool)
     missing[rest] = True
@@ -189,7 +190,7 @@ def _near(
     normal: NDArray[np.float64],
     max_distance: float,
 ) -> TrianglePoints:
-    """Search triangles along the normals of n points, and return the nearest points with similar normals.
+    """Trace rays along the normals of n points, and return the nearest hits on faces with similar normals.
 
     Parameters
     ----------

@@ -14,16 +14,16 @@ from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
 
-# Largest number of patches outside narrow gaps, and largest number inside them. If there are more, patches
-# are built from larger blocks of texels.
+# Patches are the blocks of texels that radiosity treats as one surface element. This is the largest number of
+# patches outside narrow gaps, and also the largest number inside them. Beyond it, patches are larger blocks.
 MAX_PATCHES = 32768
-# Limits of the number of rays from each patch for its form factors. Within them, it is the number of
-# hemisphere rays per texel.
+# Smallest and largest number of rays from each patch for its form factors. Between these limits, the number
+# equals the hemisphere rays per texel.
 MIN_PATCH_RAYS, MAX_PATCH_RAYS = 128, 512
 
-# Share of the texels of a page that charts cover, for a free scale and for a given density. Measured in this
-# project's scenes at 512 and 1024 texels a side: 0.67 to 0.83 and 0.55 to 0.69. It is lower for a given
-# density, because each instance must fit on one page.
+# Share of the texels of a page that charts cover: without the setting `density`, and with it. In this
+# project's scenes at 512 and 1024 texels a side, the share was 0.67 to 0.83 without `density` and 0.55 to
+# 0.69 with it. It is lower with `density`, because each instance must fit on one page at this scale.
 FILLED, FILLED_AT_DENSITY = 0.8, 0.65
 # Rays per texel that do not depend on settings: to find points inside geometry, to each light without area,
 # and to nearby emitters.
@@ -31,13 +31,13 @@ INSIDE_RAYS, DELTA_LIGHT_RAYS, NEAR_RAYS = 4, 16, 4
 
 MIB = 1 << 20
 # All byte numbers are resident memory, fitted to peaks measured with `benchmarks/memory_peaks.py`.
-# Python, libraries and compiled kernels together, and each triangle.
+# Memory of Python, libraries and compiled kernels together, and memory of each triangle.
 BASE_BYTES, BYTES_PER_TRIANGLE = 205 * MIB, 350
 # Largest side of an image in memory, texels: readers reduce larger images by averaging blocks of 2 x 2
 # texels.
 LARGEST_IMAGE_SIDE = 8192
-# Bytes of memory for each byte of decoded image pixels: 2 for the values of the file, 1.5 for the coarser mip
-# levels.
+# Bytes of memory for each byte of decoded image pixels: 1 for the image of the scene, 1 for the copy that
+# kernels read, and 1.5 for the coarser mip levels of this copy.
 BYTES_PER_IMAGE_BYTE = 3.5
 # Number of texels up to which the 16 sample points of each texel are cached between ray stages, and the bytes
 # of these points (position and normal, float32). Bakes with more texels cache no points.
@@ -50,8 +50,8 @@ LIGHT_RAY_BYTES_PER_TEXEL, LIGHT_FINISH_BYTES_PER_TEXEL = 200, 380
 BYTES_PER_PATCH_RAY = 28
 # Bytes of Open Image Denoise per pixel of one page, and its largest total: larger pages are split into tiles.
 DENOISE_BYTES_PER_PIXEL, MAX_DENOISE_BYTES = 520, 650 * MIB
-# Number of smaller patches where charts end, normals change or gaps are narrow: per triangle, and the largest
-# total.
+# Estimated number of additional small patches where charts end, normals change or gaps are narrow: per
+# triangle, and the largest total.
 EXTRA_PATCHES_PER_TRIANGLE, MAX_EXTRA_PATCHES = 0.4, 13000
 
 
@@ -131,9 +131,9 @@ def image_bytes(scene: Scene) -> tuple[int, int]:
     decoded : int
         Size of the pixels of all decoded images, bytes.
     loading : int
-        Largest size while an image is read, bytes: all decoded images, and one image a second time with the
-        resolution of its file. If an image has more than half of `LARGEST_IMAGE_SIDE` texels a side, its file
-        is assumed to have twice that side.
+        Largest size while an image is read, bytes. It consists of all decoded images, and of one image a
+        second time at the resolution of its file. If a decoded image has more than half of
+        `LARGEST_IMAGE_SIDE` texels a side, the image in its file is assumed to have twice that side.
     """
     textures = [t for m in scene.materials for t in (m.base_colour_texture, m.emission_texture)]
     images = {id(t.image): t.image for t in textures if t is not None}.values()
@@ -180,7 +180,7 @@ class Workload:
         return min(round(even + extra), self.texels)
 
     def rays(self, settings: BakeSettings, *, delta_lights: int, emitters: bool) -> dict[Stage, int]:
-        """Estimate the number of rays of each stage. Early-out tests may save some of them.
+        """Estimate the number of rays of each stage: upper bounds, because texels may need fewer rays.
 
         Parameters
         ----------
@@ -210,9 +210,11 @@ class Workload:
     def peak_bytes(self, settings: BakeSettings) -> int:
         """Estimate the largest resident memory of a bake.
 
-        Triangles and images stay in memory throughout. The peak is reached while the largest image is read,
-        in the ray stages, which store all form factors, or while pages are finished, when the denoiser
-        allocates its memory.
+        Triangles and images stay in memory throughout. The peak is the largest of three:
+
+        - while the largest image is read;
+        - during the ray stages, which store all form factors;
+        - while pages are finished, when the denoiser allocates its memory.
 
         Parameters
         ----------

@@ -21,9 +21,10 @@ from baker.core.registry import Registry
 from baker.core.settings_model import Settings
 
 # Relative error of a stored value above which steps between stored values are visible. The eye distinguishes
-# 1 to 2 %.
+# luminances that differ by 1 to 2 %.
 VISIBLE_STEP = 0.01
-# Share of the page's mean below which a texel is displayed as black: steps there are not counted.
+# Value below which a texel is displayed as black, as a share of the page's mean. Steps between values below
+# it are not counted.
 BLACK = 0.01
 # Encoding of the files that every bake writes.
 ALWAYS_WRITTEN = "exr"
@@ -139,9 +140,9 @@ class Encoding(ABC, Generic[Options]):
         Raises
         ------
         ValueError
-            See `check_pixels`.
+            If `check_pixels` refuses the pixels.
         ResourceError
-            See `write_image`.
+            If the file cannot be written.
         """
 
     @abstractmethod
@@ -151,8 +152,8 @@ class Encoding(ABC, Generic[Options]):
         Raises
         ------
         InputError
-            If the file cannot be read, is not an image of this format, or is truncated. In the second case
-            the message contains "is not a readable".
+            If the file cannot be read, is not an image of this format, or is truncated. If it is not an image
+            of this format, the message contains "is not a readable".
         """
 
 
@@ -281,8 +282,8 @@ def encoding_of(name: str) -> Encoding[Any] | None:
     Returns
     -------
     Encoding or None
-        The encoding whose suffix the name ends with; the longest suffix if there are several. None if there
-        is none.
+        The encoding whose suffix the name ends with. If the name ends with several suffixes, the encoding
+        with the longest of them. None if no suffix fits.
     """
     plugins = [ENCODINGS.require(key, "encoding") for key in ENCODINGS.names()]
     fitting = [plugin for plugin in plugins if name.lower().endswith(plugin.suffix)]
@@ -295,9 +296,9 @@ def encodings_in_words() -> str:
     for name in ENCODINGS.names():
         if name != ALWAYS_WRITTEN:
             names.setdefault(ENCODINGS.require(name, "encoding").components, []).append(f"`{name}`")
-    words: dict[tuple[int, ...], str] = {(3,): "colours", (1,): "one value"}
+    words: dict[tuple[int, ...], str] = {(3,): "three colours", (1,): "one value per texel"}
     return "; ".join(
-        f"{', '.join(some)} ({words.get(count, 'any')})"
+        f"{', '.join(some)} for maps with {words.get(count, 'any components')}"
         for count, some in sorted(names.items(), reverse=True)
     )
 

@@ -34,7 +34,7 @@ def explain(error: BaseException) -> BakerError | None:
     Returns
     -------
     BakerError or None
-        None if the exception has another cause, which means a bug in `baker`.
+        None if no `BakerError` corresponds to the exception, which is then a bug in `baker`.
     """
     if isinstance(error, BakerError):
         return error
@@ -43,7 +43,7 @@ def explain(error: BaseException) -> BakerError | None:
     if isinstance(error, MemoryError):
         return ResourceError(_OUT_OF_MEMORY)
     if isinstance(error, RuntimeError) and str(error).startswith("Symlink loop"):
-        # From Path.resolve of Python 3.11 and 3.12.
+        # Path.resolve of Python 3.11 and 3.12 raises this error.
         return InputError("the links in this path form a loop", file=str(error).partition("'")[2].rstrip("'"))
     if isinstance(error, OSError):
         reason = _RESOURCE_ERRNO.get(error.errno or 0, error.strerror or str(error))

@@ -1,8 +1,8 @@
 """The interface of light kinds: each file of `baker.lights.kinds` registers one kind of light without area.
 
 A `LightKind` contains everything that differs between kinds: the unit, the glTF representation, the
-irradiance at points for the bake, the emission for the path tracer, and the power. Other code calls these
-functions and never compares names of kinds. A light of an unregistered kind is refused.
+irradiance at points for the bake, the emission for the path tracer, and the power. Other code reads the
+`LightKind` of a light and never compares names of kinds. A light of an unregistered kind is refused.
 
 The bake and the path tracer share a light's parameters (`PunctualLight`) but no code. `fill` computes
 irradiance in a kernel of the light's file. `emission` returns an `EmissionProfile`, which the path tracer
@@ -52,12 +52,14 @@ class FillRays(Protocol):
         origin, normal : (n, 16, 3) float32
             The 16 points of n texels, metres, and their unit normals, world.
         ray : (n, 16, 4) float32, output
-            Columns 0 to 2: direction to the light, of any length. Column 3: where the shadow ray ends, in
-            units of that length. It ends just before a light with a position, such as at 0.99999 of the
-            distance, and at 1e30 for parallel light. All values are finite, even for a point at the light.
+            Columns 0 to 2: direction to the light, of any length. Column 3: length of the shadow ray, as a
+            multiple of the direction's length. The ray ends just before a light with a position: if the
+            direction is the vector to the light, column 3 is 0.99999. For parallel light it is 1e30. All
+            values are finite, even for a point at the light.
         weight : (n, 16) float32, output
-            Unoccluded irradiance, lx, for an intensity of 1; 0 if the light is below the horizon. It is 1 lx
-            on a surface that faces parallel light, or that faces another light on its axis at 1 m.
+            Unoccluded irradiance, lx, for an intensity of 1; 0 if the light is below the horizon. A surface
+            that faces parallel light has 1 lx. A surface on the axis of another light, 1 m away and facing
+            the light, has 1 lx as well.
         """
 
 
@@ -103,7 +105,7 @@ class EmissionProfile(NamedTuple):
         Smallest cosine of the angle to the axis at which the light emits. Paths that start at the light have
         uniformly distributed directions within this cone.
     cone_scale : float or None
-        1 / (cosine of the inner angle - cosine of the outer angle) of glTF's spot.
+        1 / (cosine of the inner angle - cosine of the outer angle), as for spot lights of glTF.
     table : (n, m) float32, or None
         Values of f at n >= 2 equidistant values of c from `min_cosine` to 1, and at m >= 1 azimuths
         k 2 pi / m. With m = 1, f does not depend on the azimuth. n and m must be so large that interpolation
@@ -144,9 +146,9 @@ class LightKind:
     plausible_max : float
         Intensity above which the unit is probably wrong.
     read : callable
-        read(json, linear) for the light's JSON and the linear part, (3, 3) float64, of its node's world
-        transform. Returns fields of `PunctualLight` by name, except those that all kinds have: name, node,
-        intensity, position and direction. Raises InputError.
+        read(json, linear) takes the light's JSON, and the linear part, (3, 3) float64, of its node's world
+        transform. It returns fields of `PunctualLight` by name. The fields that all kinds have are left out:
+        name, node, intensity, position and direction. Raises InputError.
     write : callable
         write(light) returns the members of the light's JSON that `read` reads.
     describe : callable

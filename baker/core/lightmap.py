@@ -134,8 +134,11 @@ class BakeResult(Result):
     statistics : dict of channel to {min, max, mean, clipped, invalid}
     timings : dict of stage to seconds
     rays : dict of stage to number of rays
-    solve : dict, {patches, nonzeros, iterations, residual, energy: {emitted, absorbed, escaped}, ...}
-    denoise : dict, names and versions from `denoiser_name` (empty without denoising)
+    solve : dict
+        Size and convergence of the radiosity solution: {patches, nonzeros, iterations, residual,
+        energy: {emitted, absorbed, escaped}, ...}
+    denoise : dict
+        Name, version and filter of the denoiser; empty without denoising.
     out : Path or None
         The output folder, None if no folder was written.
     manifest : dict

@@ -5,9 +5,9 @@ this origin. The origin is 0 for scenes that lie around 0.
 
 The spacing of float32 numbers is about 2^-23 of their absolute value. An object of size s at distance d from
 the origin loses log2(d / s) of its 23 bits; the first `_UNCOUNTED_BITS` lost bits are ignored. The origin
-minimises the weighted sum of lost bits over all objects. A terrain or a backdrop around all other objects
-loses no bits for any origin within it. A single distant object has less weight than the other objects
-together.
+minimises the weighted sum of lost bits over all objects. The weight of an object is the square root of its
+number of triangles. A terrain or a backdrop around all other objects loses no bits for any origin within it.
+A single distant object usually has less weight than the other objects together.
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 # Number of lost bits of an object that are ignored.
 _UNCOUNTED_BITS = 3.0
-# Number of bits that an origin other than 0 must save, weighted mean over all objects.
+# Number of bits per object, as a weighted mean, that an origin other than 0 must save.
 _MIN_GAIN = 2.0
-# Number of candidate origins, which are centres of objects. Half of them are the objects with most triangles.
+# Number of candidate origins, which are centres of objects: half of them of the objects with most triangles,
+# the others of objects evenly spaced in the list of objects.
 _CANDIDATES = 64
 # Largest number of vertices read from each mesh.
 _VERTICES = 1 << 15

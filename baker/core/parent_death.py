@@ -1,4 +1,4 @@
-"""Ends a process when the process that started it ends, even if that was killed."""
+"""Ends a process when its parent process ends, even if the parent was killed."""
 
 from __future__ import annotations
 
@@ -9,20 +9,21 @@ import threading
 import time
 
 _PR_SET_PDEATHSIG = 1
-# Seconds between two looks at the parent, on systems without a signal for it.
+# Time between two tests whether the parent runs, seconds, on systems that send no signal when it ends.
 _INTERVAL = 0.5
 
 
 def end_with_parent(parent: int) -> None:
     """Kill this process as soon as its parent has ended.
 
-    On Linux the kernel does it at once, whatever this process is doing. Elsewhere a thread looks twice a
-    second, while the code that runs lets threads run.
+    On Linux the kernel kills this process immediately. On other systems a thread tests twice a second whether
+    the parent runs. This thread cannot run while native code holds the global interpreter lock.
 
     Parameters
     ----------
     parent : int
-        Id of the parent process, as known before the start of this process or as early as possible.
+        Id of the parent process, read as early as possible. If the parent has changed since, this process
+        exits immediately.
     """
     if sys.platform == "linux":
         import ctypes

@@ -1,8 +1,8 @@
 """Finds objects whose positions in float32 are too inaccurate for the size of their texels.
 
-Two kinds of coordinates are float32. Files store vertices in object space: at 100 km from the object's
-origin, the spacing of float32 numbers is 8 mm for any transform of the node. A bake traces positions relative
-to the scene's origin: an object 100 km from that origin has the same spacing.
+Two kinds of coordinates are float32. Files store vertices in object space. 100 km from the object's origin,
+float32 numbers are spaced by 8 mm, and no transform of the node changes this. A bake traces positions
+relative to the scene's origin. 100 km from that origin, they have the same spacing.
 """
 
 from __future__ import annotations

@@ -21,12 +21,12 @@ from baker.core.printable import message_line, printable
 from baker.core.result import Result
 from baker.core.source_mesh import SourceScene
 
-# Smallest range of a light, metres: the inverse square of a smaller range would overflow float32.
+# Smallest range of a light, metres. Smaller ranges are raised to it, so that 1 / range^2 fits into float32.
 _SHORTEST_RANGE = 1e-12
 
 
-# Largest absolute image uv, repeats of the image. Beyond it, the spacing of float32 numbers exceeds 1/64 of
-# the image, and areas of triangles in uv may overflow.
+# Largest absolute image uv, number of repeats of the image. Beyond it, the spacing of float32 numbers exceeds
+# 1/64 of the image, and areas of triangles in uv may overflow.
 LARGEST_UV = 2.0**18
 
 

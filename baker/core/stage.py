@@ -27,7 +27,7 @@ class Stage(StrEnum):
     FINISH = "finish"
     DENOISE = "denoise"
     WRITE = "write"
-    # Before and around a bake.
+    # Work before a bake, and the progress of several bakes or of a cluster.
     START = "start"
     COMPILE = "compile"
     BATCH = "batch"

@@ -113,7 +113,7 @@ class TexelBuffer:
         return image.reshape(shape if page is not None else (n_pages, *shape))
 
     def with_copies(self, entry: NDArray[np.int32]) -> TexelBuffer:
-        """Return the buffer with copies of the given entries (m,) appended. `lookup` has no copies."""
+        """Return the buffer with copies of the entries `entry` (m,) appended. `lookup` refers to no copy."""
         names = ("pixel", "back", "chart", "instance", "area", "position", "normal", "albedo")
         longer: dict[str, Any] = {
             name: np.concatenate([getattr(self, name), getattr(self, name)[entry]]) for name in names

@@ -159,7 +159,10 @@ def _compare(address: str, here: Mapping[str, Any], there: Mapping[str, Any]) ->
 
 
 def _checked(versions: dict[str, Any], work: Callable[..., Any], *arguments: Any) -> Any:
-    """Run in a worker: check its versions first, because it may have joined after `_check_versions`."""
+    """Run in a worker: compare the library versions, and then call `work`.
+
+    `Cluster` compares the versions of its workers when it connects, but this worker may have joined later.
+    """
     from distributed import get_worker
 
     _compare(get_worker().address, versions, library_versions())

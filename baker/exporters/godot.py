@@ -9,9 +9,9 @@ from baker.exporters.common import place_named_bake, template, write_readme, wri
 
 FILES = ("lightmap.gdshader", "lightmaps.gd", "import_scene.gd")
 FILES_3 = ("lightmap.shader", "lightmaps.gd")
-# Import settings of the pages for Godot 3 and 4: linear, without mip levels, which would mix charts, and
-# uncompressed even when a page is used in 3D. `compress/mode=3` is "uncompressed" in Godot 3 and "VRAM
-# uncompressed" in Godot 4.
+# Import settings of the pages for Godot 3 and 4. Pages are linear and have no mip levels, because mip levels
+# would mix charts. Pages stay uncompressed even if they are used in 3D: `compress/mode=3` is "uncompressed"
+# in Godot 3 and "VRAM uncompressed" in Godot 4.
 _IMPORT = """\
 [remap]
 

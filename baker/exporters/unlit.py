@@ -151,7 +151,7 @@ def _unlight(material: Json, page: int) -> None:
 
 
 def _kind(material: Material) -> Material:
-    """Return a white material that keeps only sidedness and alpha mode; the page's texture is added later."""
+    """Return a white material with the sidedness and alpha mode of `material`; the texture is added later."""
     return Material(
         name="unlit",
         base_colour=(1.0, 1.0, 1.0, 1.0),

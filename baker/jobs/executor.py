@@ -50,10 +50,14 @@ class JobExecutor(Protocol):
         """Start a job; the caller never has more than `slots` jobs running."""
 
     def next_event(self, timeout: float) -> Event | None:
-        """Return the next event of any job, or None if there is none within `timeout` seconds."""
+        """Return the next event of any job.
+
+        None if there is no event within `timeout` seconds. None may also be returned earlier, for example if
+        an idle worker has died.
+        """
 
     def close(self) -> None:
-        """Stop all jobs immediately; the output folders of unfinished jobs are unchanged."""
+        """Stop all jobs immediately; the output folders of unfinished jobs keep their old content."""
 
 
 class LocalJobExecutor:
@@ -78,7 +82,10 @@ class LocalJobExecutor:
         worker.begin(job, threads=threads, force=force)
 
     def next_event(self, timeout: float) -> Event | None:
-        """Return the next event of any worker, or None if there is none within `timeout` seconds."""
+        """Return the next event of any busy worker.
+
+        None if there is no event within `timeout` seconds, or as soon as an idle worker has died.
+        """
         try:
             worker, message = self._heard.get(timeout=timeout)
         except queue.Empty:
@@ -98,7 +105,7 @@ class LocalJobExecutor:
         return Event(ticket, ended=True, error=message.get("error"))
 
     def close(self) -> None:
-        """Kill all workers and remove their unfinished output."""
+        """Kill all workers. Undo their incomplete writes to output folders, and delete temporary folders."""
         for worker in self._idle:
             worker.end(None)
         for worker, (_, job) in self._busy.items():
@@ -132,7 +139,10 @@ class _Worker:
         self.heard.put((self, {"dead": True, "error": _death(self.process.wait())}))
 
     def end(self, job: Job | None) -> None:
-        """Kill the process, and remove the unfinished output of `job`, its current job."""
+        """Kill the process. Undo an incomplete write to the output folder of its current job, `job`.
+
+        The temporary folders of this output are deleted.
+        """
         self.process.kill()
         self.process.wait()
         self.listener.join()
@@ -145,7 +155,8 @@ class _Worker:
 
 
 def _death(status: int) -> dict[str, Any]:
-    # A user or the operating system (out of memory) sends SIGKILL; other signals are crashes of native code.
+    # Status -9 is SIGKILL, sent by a user or by the operating system if memory runs out. Other negative
+    # numbers are signals, mostly crashes of native code. Positive numbers are exit codes.
     if status == -9:
         why = "its process was killed from outside, most likely for want of memory"
     else:

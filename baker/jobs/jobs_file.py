@@ -31,7 +31,7 @@ class Job:
     Attributes
     ----------
     scene : Path
-        The scene file. If a glob matched no file, the pattern.
+        The scene file, or the pattern of a glob that matched no file.
     out : Path or None
         The output folder. None if a glob matched no file.
     settings : BakeSettings
@@ -176,7 +176,7 @@ def _written_by_a_bake(scene: Path, base: Path) -> bool:
 
 
 def _output(path: Path, where: str, pattern: str, scene: Path) -> Path:
-    """Return `pattern` with `{stem}` (scene's file name) and `{parent}` (name of its folder) filled in."""
+    """Return `pattern` with `{stem}` replaced by the scene's file name, `{parent}` by its folder's name."""
     words = {"stem": scene.stem, "parent": scene.resolve().parent.name}
 
     def put(match: re.Match[str]) -> str:

@@ -60,7 +60,9 @@ class Outcome:
     state : str
         "baked", "unchanged" or "failed"; in a dry run, the expected state.
     why : str
+        The reason for the state, as text for users.
     seconds : float
+        Duration of the bake, seconds; 0 if the job was not baked.
     code : int
         Exit code for a failed job; 0 otherwise.
     """
@@ -272,7 +274,7 @@ class _Run:
         _release(ticket)
 
     def report_all(self, *, blocked: bool) -> None:
-        """Report the progress of all jobs as one stage; `blocked` if all of them wait for other runs."""
+        """Report the progress of all jobs as one stage; `blocked` if other runs lock all waiting jobs."""
         n = len(self.jobs)
         names = [f"{t.job.scene.stem}: {t.stage} {t.fraction:.0%}" for t in self.running.values()]
         if blocked:

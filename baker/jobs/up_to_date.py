@@ -1,8 +1,11 @@
 """Checks whether an output folder is up to date, by hashes of file contents and not by file times or paths.
 
-The manifest of a bake contains one hash of the scene and the files that it refers to, the settings, the
-versions of baker and its libraries, and the hash of each written file. An output folder is up to date if all
-of these are equal to the current values.
+An output folder is up to date if these entries of its manifest equal the current values:
+
+- the hash of the scene file together with the files that it refers to;
+- the settings;
+- the versions of baker and its libraries;
+- the hash of each written file.
 """
 
 from __future__ import annotations

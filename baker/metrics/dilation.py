@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
-# A dilated value is wrong if it is above `_FACTOR` times the largest covered neighbour plus the slack, or
-# below the smallest one divided by `_FACTOR` minus the slack. The slack is `_SLACK` times the mean of the
-# page.
+# Let high and low be the largest and the smallest value of the covered neighbours. A dilated value is wrong
+# if it is above `_FACTOR` high + s or below low / `_FACTOR` - s. s is `_SLACK` times the mean of the page.
 _FACTOR = 4.0
 _SLACK = 0.02
 

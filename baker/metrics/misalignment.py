@@ -22,12 +22,13 @@ _BETTER = 0.9
 _Z = 4.0
 # Number of usable texels below which no decision is made.
 _MIN_TEXELS = 32
-# Relative error of a correct map. Squared errors are divided by the sum of its square and the variance of the
-# reference. The quotient is clipped at _CLIP, so that a few texels with large errors do not dominate.
+# Relative error of a correct map, and upper limit of a texel's misfit. The misfit of a texel is its squared
+# relative error, divided by `_TOLERANCE`^2 + s^2. s is the relative standard error of the reference.
+# Misfits are clipped at `_CLIP`, so that a few texels with large errors do not dominate.
 _TOLERANCE, _CLIP = 0.03, 9.0
 # Exponents that are tested, from 0.30 to 3.3; the middle one is 1.
 _POWERS = np.exp(np.linspace(-1.2, 1.2, 241))
-# Value at which the residual of a texel is clipped, natural logarithm.
+# Largest residual of a texel, as a difference of natural logarithms. Larger residuals are clipped to it.
 _MAX_RESIDUAL = 0.1
 
 

@@ -15,7 +15,7 @@ from scipy.ndimage import binary_erosion, maximum_filter, minimum_filter
 _NEIGHBOURS = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], bool)
 # Smallest outlier factor of an outlier, see `outlier_factor`.
 _MIN_FACTOR = 1.1
-# Relative change over a distance of two texels above which light is steep.
+# Relative change of light over a distance of two texels. Above this change, a texel is steep.
 _MIN_CHANGE = 0.1
 # Share of the page's median that keeps dark texels from large ratios: added to values in `outlier_factor`,
 # and the lower limit of the denominator in `steep_texels`.

@@ -67,7 +67,7 @@ def light_level(light: NDArray[np.float64]) -> NDArray[np.int64]:
     Parameters
     ----------
     light : (n,) float64
-        Light values. Values below 1e-7 times the largest value are replaced by this.
+        Light values. Values below 1e-7 times the largest value are raised to this limit.
 
     Returns
     -------

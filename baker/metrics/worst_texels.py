@@ -23,7 +23,9 @@ def worst_texels(
     position: NDArray[np.float64],
     channels: Mapping[str, Any],
 ) -> list[dict[str, Any]]:
-    """Return the ten texels with the largest relative error minus three standard errors of the reference.
+    """Return the ten texels with the largest significant error.
+
+    The significant error is the relative error minus three standard errors of the reference.
 
     Parameters
     ----------

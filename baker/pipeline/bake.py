@@ -77,7 +77,7 @@ def bake(
     SettingsError
         If a setting does not fit the scene or the channels.
     ResourceError
-        If memory, disk or a library is missing.
+        If memory or disk space runs out, or a library is missing.
     Cancelled
         If `progress` returned a truthy value.
     """
@@ -143,7 +143,10 @@ def _trace(
     executor: TileExecutor,
     compiling: precompile.Process,
 ) -> TracedTexels:
-    """Run the ray stages. Free arrays that finishing does not read, 1 GB for a page of 4096 texels a side."""
+    """Run the ray stages, and return only the results that `finish_pages` reads.
+
+    All other arrays are freed, which are 1 GB for a page of 4096 texels a side.
+    """
     executor.open(scene, atlas, settings)
     prepared = prepare_scene(scene, atlas, settings, record)
     if any(channel.needs_light for channel in channels.values()):

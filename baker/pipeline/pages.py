@@ -154,9 +154,9 @@ def _page_layer(texels: TexelBuffer, layer: Layer, page: int) -> PageLayer:
 def _unconverged(layers: tuple[Layer, ...], chart: NDArray[np.int32], signed: bool) -> NDArray[np.bool_]:
     """Return (n_front,) bool: lit texels whose relative standard error exceeds `UNCONVERGED`.
 
-    The error is that of the sum of all layers. The value is the mean of the components, or of their absolute
-    values if they are signed. It is raised to at least a twentieth of the geometric mean over lit texels of
-    the chart.
+    The relative standard error is the error of the sum of all layers, divided by a value. The value is the
+    mean of the components, or of their absolute values if they are signed. It is at least a twentieth of the
+    geometric mean over lit texels of the chart.
 
     chart : (n_front,) int32, chart of each texel
     """

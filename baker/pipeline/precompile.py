@@ -180,9 +180,9 @@ def cast_rays(kind: str = "") -> None:
     seen, analytic = tile_emitters(emitters, origin), np.zeros(_TEXELS, np.uint8)
     needed = needed_shading(emitters, shading)
 
-    # Compile kernels in the order in which a bake calls them: choice of emitters, shadow rays, gather. The
-    # bake takes about the same time to compile the kernels of all stages before direct light, and those of
-    # narrow gaps and form factors.
+    # Compile kernels in the order in which a bake calls them: choice of emitters, shadow rays, gather. In the
+    # meantime, the bake itself compiles the kernels of all stages before direct light, and those of narrow
+    # gaps and form factors, which takes about as long.
     widest_view(emitters, origin)
     counts, every = np.zeros((2, 1, 1), np.int32), np.ones(1, bool)
     bounds = np.array([0, _TEXELS])

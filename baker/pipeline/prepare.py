@@ -50,7 +50,7 @@ class PreparedScene:
     emitters : Emitters
         Emissive triangles, grouped in clusters.
     hit_kind : (T,) uint8
-        Meaning of a first hit on each triangle, see `kernels.probe`.
+        Meaning of a first hit on each triangle, see `baker.kernels.probe`.
     outside : (n_uncut,) uint16
         For each of the n_uncut entries before texels were split into sides, a mask of its 16 points: bit k is
         set if point k is outside geometry.

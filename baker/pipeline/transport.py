@@ -185,7 +185,7 @@ def _reflected(
     """Return (n, 3) float32, lx: the radiosity of each entry, which the final gather then reads.
 
     complete : (n, 3) float32, lx, direct light of each entry
-    level : (n,) uint8, how narrow the gap at each entry is, see `gap_level`
+    level : (n,) uint8, how narrow the gap at each entry is, see `baker.radiosity.narrow_gaps.gap_level`
     """
     texels, settings = prepared.texels, prepared.settings
     sky: NDArray[np.float64] = np.array(settings.sky_radiance, np.float64)

@@ -2,9 +2,9 @@
 
 An engine looks up the map bilinearly at arbitrary points of the surface. The lookup reads four texels, which
 may be covered, filled or dilated; they are called the footprint. The reference of a lookup is the mean light
-at points inside these four texels, weighted like the texels in the lookup. Only points of the same surface
-that are visible from the looked-up point are used. Otherwise, a lookup next to a wall would be compared with
-light on the other side of the wall.
+at points inside these four texels. The points in a texel together have the weight of the texel in the lookup.
+Only points of the same surface that are visible from the looked-up point are used. Otherwise, a lookup next
+to a wall would be compared with light on the other side of the wall.
 """
 
 from __future__ import annotations
@@ -191,8 +191,8 @@ def _footprints(
     pixel, number = np.unique(tap[usable], return_inverse=True)
     spread = surface_points(geometry, pixel, size, _POINTS_PER_TEXEL, seed)
     row, column = np.nonzero(usable)
-    # Make _POINTS_PER_TEXEL candidates for each of the m pairs of a point `row` and a texel `column` of its
-    # four.
+    # Make _POINTS_PER_TEXEL candidates for each of m pairs. A pair consists of a point, with the index `row`,
+    # and one of the four texels of its footprint, with the index `column`.
     position, normal, face = (array[number] for array in (spread.position, spread.normal, spread.face_normal))
     # Keep candidates on the same surface that are visible from the point.
     off = position - point.position[row][:, None]

@@ -51,7 +51,7 @@ class Points:
     pixel : (n,) int64
         Texel of each point, (page * H + row) * W + column.
     owner, chart, room : (n,) int32
-        Indices of object, chart and room. Rooms are defined in `surroundings`; -1 for none.
+        Indices of object, chart and room; -1 for none. `baker.verification.surroundings` defines rooms.
     gap : (n,) bool
         Whether the point is in a narrow gap or inside geometry.
     valid_share : (n,) float64
@@ -125,7 +125,7 @@ def choose_points(
 ) -> tuple[Points, NDArray[np.float64]]:
     """Choose the n points to compare and find their rooms and gaps.
 
-    Returns the points, and (m, 3) float64, metres: points in the air, see `surroundings`.
+    Returns the points, and (m, 3) float64, metres: points in the air, see `baker.verification.surroundings`.
     """
     size, seed = bake.atlas.resolution, settings.seed
     owner, covered = pages.owner.reshape(-1), pages.covered.reshape(-1)

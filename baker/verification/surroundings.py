@@ -1,8 +1,8 @@
 """Finds which compared points are inside geometry or in narrow gaps, and groups the others in rooms.
 
-`pathtracer.inside_geometry` finds the points inside geometry. A texel is in a narrow gap if more than half of
-the rays from its points end within two texels. Texels cannot resolve the light there, so texels in gaps are
-only used for the metrics over all texels.
+`baker.pathtracer.inside_geometry` finds the points inside geometry. A texel is in a narrow gap if more than
+half of the rays from its points end within two texels. Texels cannot resolve the light there, so texels in
+gaps are only used for the metrics over all texels.
 
 A room is a set of points that are visible from one point in the air. Points in the air are midpoints of rays
 between surfaces. The point in the air from which most points are visible defines the first room. The point
@@ -26,7 +26,7 @@ from baker.pathtracer.scene import Reference
 
 # Length of a ray below which it counts as near, texels.
 _NEAR = 2.0
-# Share of near rays above which a texel is in a gap, and share above which it is in contact with other
+# Share of near rays above which a texel is in a gap, and share above which it is in contact with another
 # surface.
 _GAP, _CONTACT = 0.5, 0.1
 # Number of points in the air from which rooms are found, and smallest number of texels in a room.

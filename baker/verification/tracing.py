@@ -4,8 +4,9 @@ If only rare paths connect a dark point to a light, its first samples are all bl
 Such a point would get no further samples, and its reference would be 0. The standard error of n samples
 therefore includes the mean light of the room divided by n, as if one further sample had that value.
 
-Errors are relative to the light of the point, or to `dark_floor` of its room if that is larger. Dim rooms
-therefore reach the same relative error as bright rooms.
+Errors are relative to the light of the point. If that is less than a floor, they are relative to the floor:
+`baker.metrics.error_metrics.dark_floor` of the points in the same room. Dim rooms therefore reach the same
+relative error as bright rooms.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ def measure_unverified_area(
     pages : Pages
         The texels of all pages.
     air : (m, 3) float64, metres, relative to the geometry's origin
-        Points in the air between surfaces, see `surroundings`.
+        Points in the air between surfaces, see `baker.verification.surroundings`.
     seed : int
         Seed of the random choice.
 

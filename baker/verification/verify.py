@@ -64,7 +64,7 @@ class ChannelCheck(Metrics):
     halves : two (n, C) float64
         Estimates of the reference from two independent halves of the samples.
     metrics : dict of str to number or None
-        Metrics of all criteria, see `criteria.registry`.
+        Metrics of all criteria, see `baker.verification.criteria.registry`.
     remarks : dict of str to str
         Sentences by metric, each about the fault that the metric indicates.
     unresolved : int
@@ -87,7 +87,7 @@ class ChannelCheck(Metrics):
 
     @property
     def exponent(self) -> float | None:
-        """Return the exponent p of the fit value = c * reference^p, see `metrics.misalignment`."""
+        """Return the exponent p of the fit value = c * reference^p, see `baker.metrics.misalignment`."""
         power: float | None = self.metrics["exponent"]
         return power
 

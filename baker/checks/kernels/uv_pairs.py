@@ -7,8 +7,11 @@ import numpy as np
 
 from baker.trace.jit import kernel
 
-# Indices into `counts`, the numbers of: samples covered by a triangle, further coverings of covered samples,
-# triangles that share samples with an earlier triangle, and pairs written to `pairs`.
+# Indices into `counts`:
+# COVERED: number of samples that at least one triangle covers;
+# COVERED_AGAIN: number of times that a further triangle covers a covered sample;
+# OVERLAPPING: number of triangles that share samples with an earlier triangle;
+# LISTED: number of pairs written to `pairs`.
 COVERED, COVERED_AGAIN, OVERLAPPING, LISTED = 0, 1, 2, 3
 
 

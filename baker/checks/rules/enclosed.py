@@ -13,13 +13,13 @@ from baker.checks.rule import check
 from baker.checks.world_triangles import WorldTriangles
 from baker.topology.solids import BEFORE, BEHIND, Solids, SolidSurfaces, find_solids, lights_and_cameras
 
-# A face is tested at its centroid and near its three corners. This is the share of the way from a corner to
-# the centroid at which the point near the corner lies.
+# A face is tested at its centroid and at one point near each corner. This is the distance of such a point
+# from its corner, as a share of the distance from the corner to the centroid.
 _DRAWN_IN = 0.02
 # Number of rays from a point that must hit the inner side of a solid for the point to count as inside.
 _PROOF = 2
-# A ray's direction is the normal plus one of these unit vectors. They are arbitrary, so that rays rarely hit
-# edges of modelled geometry.
+# A ray's direction is the normal plus one of these unit vectors. The vectors are arbitrary, so that rays
+# rarely hit edges of modelled geometry.
 _DIRECTIONS = np.array(
     [
         [0.53, 0.41, 0.743],

@@ -36,8 +36,8 @@ def inside_out(context: CheckContext) -> Iterator[RawFinding]:
 
     From outside, such a part is black and absorbs all light. The fronts of rooms point inwards by design.
     Parts with a light, a camera or other geometry inside are therefore not reported. Parts that emit, the
-    inner surfaces of shells, and double-sided surfaces are not reported either. If these parts make up less
-    than 5 % of an object's surface, the finding is a warning instead of an error.
+    inner surfaces of shells, and double-sided surfaces are not reported either. If the reported parts make up
+    less than 5 % of an object's surface, the finding is a warning instead of an error.
     """
     for m, facts in enumerate(context.meshes):
         wrong = inside_out_parts(context, m)
@@ -83,14 +83,15 @@ def inside_out_parts(context: CheckContext, mesh: int) -> list[NDArray[np.int64]
 
 
 def _may_be(facts: MeshFacts) -> bool:
-    """Return False if certainly no closed part is inside out, using only fast tests that need no edges."""
+    """Return False if fast tests, which need no edges, rule out that a closed part is inside out."""
     if facts.double_sided.all():
         return False
     if len(facts.good) < 4:
         return False
     total = float(np.linalg.norm(facts.area_vector.sum(axis=0)))
-    # The sign of the volume of the whole mesh is no sufficient test, because parts of both signs may add up.
-    # A mesh is ruled out if its area vectors add up to zero and no front faces the centroid.
+    # The sign of the volume of the whole mesh is not a sufficient test, because a larger part with positive
+    # volume may hide a part with negative volume. No part is inside out if the area vectors add up to zero
+    # and no front faces the centroid.
     outward = np.einsum("gx,gx->g", facts.corner[:, 0] - facts.corner.mean(axis=(0, 1)), facts.area_vector)
     return bool((outward < 0).any()) or total > _ROUNDING * float(facts.area.sum())
 

@@ -50,7 +50,8 @@ def flat_light(context: CheckContext) -> Iterator[RawFinding]:
     """Spot and directional lights whose direction is undefined, because a node has a scale of zero.
 
     The scale along the axis of the light is zero in the light's node or in a parent. The transformed
-    direction is then zero, or only rounding errors. Point lights need no direction and are not affected.
+    direction is then zero or consists of rounding errors. Point lights have no direction, so they are not
+    affected.
     """
     for warning in context.scene.warnings:
         if warning.code == "flat-light":

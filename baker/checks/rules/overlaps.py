@@ -120,7 +120,7 @@ def _pierces(
 def coplanar_overlap(context: CheckContext) -> Iterator[RawFinding]:
     """Coplanar surfaces of different objects that overlap and have the same front (z-fighting).
 
-    Engines show one or the other at random, and each shadows the other at random. Two surfaces count as
+    Engines show either surface at random, and each surface shadows the other at random. Two surfaces count as
     coplanar if the distance between their planes is less than a millionth of the scene's diagonal. A box on a
     floor is not reported, because the fronts of the two surfaces point in opposite directions.
     """

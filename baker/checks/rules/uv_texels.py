@@ -23,9 +23,10 @@ DENSITY_FACTOR = 4.0
 # Ratio of singular values above which a face counts as stretched, and the share of an object's surface above
 # which stretched faces are reported.
 STRETCH, MOST_STRETCHED = 4.0, 0.05
-# Share of its bounding rectangle below which the area of a layout is reported.
+# Area of a layout as a share of its bounding rectangle. Below this share, the layout is reported.
 LEAST_FILLED = 0.4
-# Share of an object's surface without area in TEXCOORD_0 above which this uv set is a palette lookup.
+# Share of an object's surface that has no area in TEXCOORD_0. Above this share, TEXCOORD_0 counts as a lookup
+# of palette colours.
 PALETTE_SHARE = 0.9
 
 

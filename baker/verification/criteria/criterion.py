@@ -15,10 +15,10 @@ from baker.metrics.groups import ComparedPoints
 from baker.verification.points import EDGE, OUTLIER, SCARCE, STEEP, TEXEL, Pages, Points
 from baker.verification.unverified_area import UnverifiedArea
 
-# Share of a texel's square, covered by surface with valid points, below which a texel is not interior.
+# Share of a texel's square that surface with valid points covers. Below this share, a texel is not interior.
 _MIN_COVERED = 0.75
-# Share of a cosine-weighted hemisphere around the shading normal that lies below the facet: above it, a point
-# counts as tilted.
+# Share of a cosine-weighted hemisphere around the shading normal that lies below the facet. Above this share,
+# a point counts as tilted.
 _MAX_BELOW = 0.005
 
 
@@ -62,7 +62,7 @@ class ChannelData:
 
     @property
     def interior(self) -> NDArray[np.bool_]:
-        """Return (n,) bool: the points that are mostly covered by valid surface, not in gaps and not tilted.
+        """Return (n,) bool: the points whose texels valid surface mostly covers, not in gaps, not tilted.
 
         Light levels, regions, objects and charts are compared at these points only.
         """

@@ -17,7 +17,8 @@ from baker.verification.criteria.groups import make_groups, worst_metrics
 _WRONG, _Z = 0.5, 4.0
 # Number of points below which no metrics are computed.
 _MIN_POINTS = 8
-# Weight of filled texels in a lookup, above which its point belongs to the group beside filled texels.
+# Weight of filled texels in the bilinear lookup at a point. Above this weight, the point is counted in the
+# group of points beside filled texels.
 _FILLED = 0.1
 
 

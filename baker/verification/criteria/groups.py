@@ -14,7 +14,7 @@ from baker.verification.criteria.criterion import ChannelData
 # the AO is invisible.
 MIN_LIGHT = {"irradiance": 0.0, "ao": 0.2}
 # Number of points below which a group's own error counts as 0. (The own error is the relative spread of the
-# values about the reference, without the reference's noise; see `metrics.groups`.)
+# values about the reference, without the reference's noise; see `baker.metrics.groups`.)
 MIN_NOISE_POINTS = 40
 
 

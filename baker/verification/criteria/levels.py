@@ -1,9 +1,10 @@
 """Computes the own error of each light level, in dark as well as in bright areas.
 
-The own error is defined in `metrics.groups`. A light level contains the texels of all rooms whose light is
-within half a power of ten. The darkest 5, 10 and 20 % of all texels are further groups, so that a fault of
-the darkest texels is not hidden among brighter texels. Narrower levels would not detect more faults, because
-texels are assigned to levels by values that include the error.
+The own error is defined in `baker.metrics.groups`. A light level contains the texels of all rooms whose light
+is within the same half power of ten. The darkest 5, 10 and 20 % of all texels are further groups, so that a
+fault of the darkest texels is not hidden among brighter texels. Narrower levels would not detect more faults:
+texels are assigned to levels by values that include the error, so a large error moves a texel to another
+level.
 """
 
 from __future__ import annotations

@@ -13,7 +13,8 @@ from baker.verification.criteria.criterion import ChannelData, Criterion, Criter
 from baker.verification.criteria.groups import make_groups, worst_metrics
 from baker.verification.criteria.levels import level_light
 
-# `equal_weight` of `level_light`, about the relative error of single texels in a correct map.
+# Argument `equal_weight` of `levels.level_light`. It is about the relative error of single texels in a
+# correct map.
 _EQUAL_WEIGHT = 0.03
 # Largest number of objects that are listed for a region.
 _LISTED = 3
