@@ -82,7 +82,10 @@ def _split(value: Any) -> Any:
     """Split a text, or each text of a list, at commas into a list of names; return other values unchanged."""
     if isinstance(value, list | tuple) and all(isinstance(part, str) for part in value):
         value = ",".join(value)
-    return [part.strip() for part in value.split(",") if part.strip()] if isinstance(value, str) else value
+    if not isinstance(value, str):
+        return value
+    # A name that is given twice counts once.
+    return list(dict.fromkeys(part.strip() for part in value.split(",") if part.strip()))
 
 
 def _one_name(value: Any) -> Any:

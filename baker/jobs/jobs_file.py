@@ -119,6 +119,7 @@ def _expand(path: Path, where: str, table: dict[str, Any], overrides: dict[str, 
     pattern = values.pop("out", None)
     if not isinstance(pattern, str) or not pattern:
         raise _error(path, where, 'out is missing; write out = "baked/{stem}", here or in [defaults]')
+    _check_path(path, where, "out", pattern)
     try:
         settings = make_settings(values)
         settings = make_settings({**values, **overrides})
@@ -142,7 +143,14 @@ def _words(path: Path, where: str, key: str, value: Any) -> list[str]:
     words = value if isinstance(value, list) else [value]
     if not words or not all(isinstance(word, str) and word for word in words):
         raise _error(path, where, f"{key} must be a path in quotes, or a list of them")
+    for word in words:
+        _check_path(path, where, key, word)
     return words
+
+
+def _check_path(path: Path, where: str, key: str, word: str) -> None:
+    if "\0" in word:
+        raise _error(path, where, f"{key} contains a NUL character, which no path can have")
 
 
 def _find(path: Path, where: str, pattern: str) -> list[Path]:

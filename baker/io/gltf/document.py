@@ -52,6 +52,8 @@ IRRELEVANT = frozenset(
 _LISTS = ("accessors", "bufferViews", "materials", "meshes", "nodes", "images", "samplers", "textures")
 # Ignored extensions that `material.py` reports for each material, so that `_check_extensions` does not.
 _REPORTED = frozenset({"KHR_materials_transmission"})
+# Largest depth of objects and lists in each other.
+_DEEPEST = 100
 _COMPRESSED_VIEW = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
@@ -189,7 +191,27 @@ def _parse_json(text: bytes, file: str) -> dict[str, Any]:
         raise InputError(f"the file is not glTF: its JSON is broken ({error})", file=file) from None
     if not isinstance(value, dict):
         raise InputError("the file is not glTF: its JSON is not an object", file=file)
+    _check_depth(value, file)
     return value
+
+
+def _check_depth(root: dict[str, Any], file: str) -> None:
+    """Raise `InputError` for values that are nested more deeply than recursive functions can follow."""
+    level = {key: value for key, value in root.items() if isinstance(value, dict | list)}
+    for key, top in level.items():
+        inside: list[Any] = [top]
+        for _ in range(_DEEPEST):
+            inside = [
+                part
+                for value in inside
+                for part in (value.values() if isinstance(value, dict) else value)
+                if isinstance(part, dict | list)
+            ]
+            if not inside:
+                break
+        else:
+            message = f"the JSON is nested too deeply: more than {_DEEPEST} levels; remove the innermost ones"
+            raise InputError(message, file=file, object=key)
 
 
 def _check_version(root: JsonObject) -> None:
