@@ -143,7 +143,7 @@ class CommonSettings(Settings):
         """Return the AO distance in metres (may be inf) for a scene whose bounding box has this diagonal."""
         if self.ao_distance.strip().endswith("%") and not diagonal > 0:
             raise InputError(
-                "all surfaces lie in one point, as far as numbers of 32 bits can tell: the scene is too small, or"
+                "all surfaces lie in one point, as far as 32-bit numbers can tell: the scene is too small, or"
                 " too far from the origin for its size; scale it up, or move it to the origin"
             )
         return ao_metres(self.ao_distance, diagonal)
