@@ -146,8 +146,8 @@ class GlbBuilder:
     ) -> None:
         """Add a light of KHR_lights_punctual.
 
-        `intensity` is in cd for point lights and in lx for directional lights. `towards` is the direction in
-        which a directional light travels.
+        `intensity` is in cd for point and spot lights, and in lx for directional lights. `towards` is the
+        direction in which the light of a spot or directional light travels.
         """
         extension = self._json.setdefault("extensions", {}).setdefault("KHR_lights_punctual", {"lights": []})
         self._use("KHR_lights_punctual")

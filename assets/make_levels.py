@@ -40,7 +40,7 @@ LEVELS: dict[str, Callable[[], Level]] = {
     "cellar": indoors.make_cellar,
     "centimetres": indoors.make_centimetres,
 }
-# Levels in the repository. `tests/e2e/test_levels.py` knows their light at some points.
+# Levels that are stored in the repository. `tests/e2e/test_levels.py` compares their light with known values.
 KEPT = ("closed", "garage", "street", "tunnel", "warehouse")
 
 

@@ -200,7 +200,7 @@ def _cycles(
 def _trace_truth(
     options: argparse.Namespace, folder: Path, surface: Path, mask: NDArray[np.bool_], out: Path
 ) -> dict[str, str]:
-    """Path-trace random texels among those that Cycles covers, whose centre lies on the surface.
+    """Path-trace random texels that Cycles covers, that is, texels whose centre lies on the surface.
 
     Writes the irradiance to `out` and returns the versions of the programs.
     """
@@ -267,10 +267,10 @@ def _tables(result: dict[str, Any], *, markdown: bool) -> str:
 
 
 def _equal(rows: list[dict[str, Any]]) -> list[tuple[str | float, ...]]:
-    """Return a row for each setting of Cycles with the fastest setting of baker whose error is not larger.
+    """Return a row for each setting of Cycles, with the fastest setting of baker that is no less accurate.
 
-    The error is the median error. The ratio of the times is a lower bound: Cycles' time is that of the bake
-    alone, baker's time is that of the whole process.
+    Settings are compared by their median error. The ratio of the times is a lower bound, because Cycles' time
+    is the time of the bake alone, and baker's time that of the whole process.
     """
     ours = [row for row in rows if row["program"] == "baker"]
     found: list[tuple[str | float, ...]] = []

@@ -58,9 +58,11 @@ def _aim_emitter(rays, on, origin, normal, group, lanes, net, shared, seeds, s, 
 
     As in a bake, a lane is inactive if the emitter or the point faces away.
 
-    rays : the packet's float32 rows, output; on : (PACKET_WIDTH,) int32 output, -1 for active lanes
-    origin, normal : (n, 16, 3) float32, the 16 points of n texels; net : (n_samples, 2), Sobol points
-    corner : (M, 12) float32 and cumulative : (M,) float32, from `_emitter_corners`
+    rays : float32 rows of the packet, output
+    on : (PACKET_WIDTH,) int32 output, -1 for active lanes
+    origin, normal : (n, 16, 3) float32, the 16 points of n texels
+    net : (n_samples, 2), Sobol points
+    corner : (M, 12) float32, cumulative : (M,) float32, results of `_emitter_corners`
     """
     k = s * N_POINTS // len(net)
     d = np.zeros(3, np.float32)

@@ -5,9 +5,9 @@
     python cycles_bake.py JOB.json
 
 JOB.json: {"scene", "resolution", "runs": [{"samples", "denoise", "seed", "out"}], "surface": FILE.npz}.
-Each `out` is an .npz file with `irradiance` (H, W, 3), where the first row is v = 0 as in glTF, `covered`
-(H, W) and `seconds`, the duration of the bake alone. Blender's triangles are written to `surface`, for the
-path tracer.
+Each `out` is an .npz file with `irradiance` (H, W, 3), `covered` (H, W) and `seconds`, the duration of the
+bake alone. The first row of the images is v = 0, as in glTF. Blender's triangles are written to `surface`,
+for `path_truth.py`.
 
 The following settings make Cycles bake the same quantity as baker. A diffuse bake without colour is E / pi.
 Every material is replaced by a Lambertian material with constant emission and a black back. Clamping and

@@ -51,10 +51,12 @@ def measure(
     Returns
     -------
     dict
-        scene, resolution, triangles, texels, width (of a packet);
-        `stages` {stage: {seconds, median, rays, rate, beside}}: shortest and median time in seconds, number
-        of rays, rate in Mrays/s for the shortest time, and the kind of bare rays to compare with;
-        `bare` and `bare_median` {kind: {ready, made}}: largest and median rate of the loops, Mrays/s.
+        - `scene`, `resolution`, `triangles`, `texels`, and `width`, the number of rays in a packet.
+        - `stages`: {stage: {`seconds`, `median`, `rays`, `rate`, `beside`}}. `seconds` is the shortest time,
+          `median` the median time in seconds, `rate` the number of Mrays/s in the shortest time, and `beside`
+          the kind of bare rays to compare with.
+        - `bare`, `bare_median`: {kind: {`ready`, `made`}}, the largest and the median rate of the loops of
+          `bare.py`, Mrays/s.
     """
     values: dict[str, Any] = {
         "resolution": resolution,

@@ -26,7 +26,7 @@ SETTINGS: dict[str, Any] = {
     "ao_samples": 64,
     "threads": 1,
 }
-# Number of jobs of the batch: ten scenes, each with several seeds.
+# Number of jobs of the batch. The jobs repeat up to ten scenes, each time with another seed.
 WANTED = 20
 
 

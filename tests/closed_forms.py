@@ -87,8 +87,8 @@ def walled_ao(distance: Any, height: float, reach: float) -> np.ndarray:
     """Return the AO of a floor at `distance` from an endless wall of `height`, for rays of length `reach`.
 
     Cosine-weighted directions are uniform in their projection to the unit disc. A ray (x, y, z) hits the
-    plane of the wall after a length of distance / x, at height z distance / x. So it is blocked where x >
-    distance / reach, outside the ellipse (x / a)^2 + y^2 = 1, a = distance / hypot(distance, height).
+    plane of the wall after a length of distance / x, at height z distance / x. So the ray is blocked if x >
+    distance / reach and (x / a)^2 + y^2 > 1, with a = distance / hypot(distance, height).
     """
     distance = np.asarray(distance, float)
     a = distance / np.hypot(distance, height)
@@ -111,7 +111,7 @@ def cornered_ao(x: Any, y: Any, reach: float) -> np.ndarray:
         cut = np.minimum(cut, 1.0)
         return np.arccos(cut) - cut * np.sqrt(1 - cut * cut)
 
-    # Overlap: the area with x > c and y > d, the integral of sqrt(1 - x^2) - d from c on.
+    # The overlap is the area with x > c and y > d, that is, the integral of sqrt(1 - x^2) - d over x > c.
     end = np.sqrt(np.maximum(1 - d * d, 0.0))
     both = 0.5 * (
         np.arcsin(end) + end * d - np.arcsin(np.minimum(c, 1)) - c * np.sqrt(np.maximum(1 - c * c, 0))

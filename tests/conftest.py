@@ -86,7 +86,7 @@ def compile_once(folder: Path) -> None:
         if kept is None:
             return compile_kernel(self, signature)
         name = hashlib.sha256(f"{kept} {self.__module__}.{self.__qualname__}".encode()).hexdigest()[:16]
-        # Acquire Numba's own lock first; otherwise two threads of one process could deadlock.
+        # Acquire Numba's lock first. In the other order, two threads of one process could deadlock.
         with global_compiler_lock, held(folder / f"kernel-{name}"):
             return compile_kernel(self, signature)
 

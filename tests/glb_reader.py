@@ -1,4 +1,4 @@
-"""Reads GLB files for tests without code of `baker`: JSON and accessors, also sparse ones."""
+"""Reads JSON and accessors, also sparse accessors, of GLB files for tests, without code of `baker`."""
 
 from __future__ import annotations
 

@@ -22,9 +22,14 @@ IDENTITY = np.eye(4, dtype=np.float32).reshape(1, 16)
 def rich_builder() -> GltfBuilder:
     """Return a document with many features that a bake must preserve.
 
-    Nodes: 0 a skinned square with morph targets, of two triangle primitives and one of lines; 1 the same
-    mesh; 2 a joint; 3 a camera; 4 the same mesh, only in the second scene; 5 a square without skin or
-    targets.
+    The nodes are
+
+    - 0: a skinned square with morph targets, made of two primitives of triangles and one of lines;
+    - 1: the mesh of node 0;
+    - 2: a joint;
+    - 3: a camera;
+    - 4: the mesh of node 0, only in the second scene;
+    - 5: a square without skin and morph targets.
     """
     b = GltfBuilder()
     grey = b.add("materials", {"name": "grey", "extras": {"shop": "no. 7"}})

@@ -15,7 +15,7 @@ def chi_square_chance(observed, expected):
     observed, expected = np.ravel(observed).astype(float), np.ravel(expected).astype(float)
     assert (observed[expected == 0] == 0).all()
     observed, expected = observed[expected > 0], expected[expected > 0]
-    # Merge bins with less than 5 expected counts, since they are not chi-square distributed.
+    # Merge bins with an expected count below 5, because the chi-square distribution is inaccurate for them.
     few = expected < 5
     if few.any():
         observed = np.append(observed[~few], observed[few].sum())

@@ -55,8 +55,8 @@ class PathTracer:
             hit, where = self._closest(point + LIFT * normal, direction)
             front = (self.normal[hit] * direction).sum(axis=1) < 0
             seen = (hit >= 0) & (front | self.double_sided[self.material[hit]])
-            # E = pi / n sum L and L = albedo E' / pi, so each bounce multiplies by the albedo of the surface
-            # hit.
+            # The reflected part of E is pi / n sum L, and the surface hit has L = albedo E' / pi. Therefore
+            # each bounce multiplies by the albedo of that surface.
             path, weight = path[seen], weight[seen] * self.albedo[self.material[hit[seen]]]
             point = where[seen]
             normal = np.where(front[seen, None], self.normal[hit[seen]], -self.normal[hit[seen]])

@@ -184,7 +184,7 @@ class SceneBuilder:
         )
 
     def bake(self, **settings: Any) -> BakeResult:
-        """Bake all channels with the uv of this builder; settings are those of `baker.bake`."""
+        """Bake irradiance without denoising, with the uv of this builder. `settings` override defaults."""
         given = {"resolution": self.size, "uv": "keep", "padding": GAP, "samples": 64, **settings}
         given = {"channels": ["irradiance"], "denoise": False, "threads": 2, **given}
         return baker.bake(self.build(), **given)

@@ -113,7 +113,8 @@ def test_ao_is_the_unoccluded_share_with_a_binomial_error(transport):
     (layer,) = CHANNELS.get("ao").layers(transport)
     np.testing.assert_array_equal(layer.value[:, 0], transport.ambient_occlusion)
     binomial = np.sqrt(transport.ambient_occlusion * (1 - transport.ambient_occlusion) / 64)
-    # The error is the binomial standard error where that is large, and above 0 everywhere.
+    # Where the binomial standard error is above 0.05, it is the error of the layer. The error is above 0
+    # everywhere.
     large = binomial > 0.05
     assert large.sum() > 10
     np.testing.assert_allclose(layer.error[large], binomial[large], rtol=0.05)
@@ -170,9 +171,9 @@ def test_a_signed_channel_of_four_components_is_one_file(toy, denoise, tmp_path)
     value = result.lightmaps["toy"].value
     covered = np.isin(result.status, (TexelStatus.COVERED, TexelStatus.UNCONVERGED))
     assert value.shape == (1, 48, 48, 4)
-    # Values of both signs are stored. Components 1 and 3 are the negatives of 0 and 2, except at chart
-    # borders: the extrapolation to texel centres keeps positive values positive, but not negative values
-    # negative.
+    # Values of both signs are stored. Components 1 and 3 are the negatives of components 0 and 2, except at
+    # chart borders. There, the extrapolation to texel centres keeps positive values positive, but not
+    # negative values negative.
     assert value[covered].min() < -0.2
     assert value[covered].max() > 0.2
     for one, other in ((0, 1), (2, 3)):

@@ -74,7 +74,7 @@ def test_a_file_holds_every_value_within_the_stated_tolerance(tmp_path, name, nu
     assert tolerance.shape == pixels.shape
     assert (miss <= tolerance).all(), (miss / np.maximum(tolerance, 1e-300)).max()
     assert np.array_equal(read.pixels, encoding.stored(pixels, options))
-    # The tolerance is not too generous: some pixel has at least 0.4 of it as error.
+    # The tolerance is not too large: the error of some pixel is more than 0.4 times its tolerance.
     if tolerance.any():
         assert (miss > 0.4 * tolerance).any()
 

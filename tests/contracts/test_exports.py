@@ -248,7 +248,7 @@ def test_godot_shaders_read_uv2_and_divide_by_pi():
 
 
 def test_unlit_holds_light_times_albedo(bake, tmp_path):
-    """Texels are sRGB of albedo x E / pi x exposure on TEXCOORD_0; no other uv sets or textures remain."""
+    """A texture with the sRGB codes of albedo x E / pi x exposure is on TEXCOORD_0, the only uv set."""
     from io import BytesIO
 
     from PIL import Image

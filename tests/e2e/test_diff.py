@@ -1,4 +1,4 @@
-"""`baker diff` reports no difference for equal bakes, and the right object and figures for changed ones."""
+"""`baker diff` reports no difference between equal bakes, and the object and size of known differences."""
 
 from __future__ import annotations
 

@@ -75,8 +75,8 @@ def test_the_light_of_very_many_repeats_is_that_of_their_mean(tmp_path: Path) ->
         result = baker.bake(scene, resolution=64, samples=64, denoise=False)
         value = result.lightmaps["irradiance"].value[result.status == TexelStatus.COVERED]
         found.append(value[value.sum(axis=-1) > 0])
-    # From the centre of the other square the form factor F is 4 / pi * A / sqrt(1 + A^2) * atan(A / sqrt(1 +
-    # A^2)), A = 1/2 (Howell, configuration B-4).
+    # The form factor from the centre of one square to the other square is F = 4 / pi * B * atan(B), where
+    # B = A / sqrt(1 + A^2) and A = 1/2 (Howell, configuration B-4).
     side = 0.5 / np.sqrt(1.25)
     centre = 4.0 / np.pi * side * np.arctan(side)
     np.testing.assert_allclose(found[1].max(axis=0), np.pi * centre * np.array(mean), rtol=0.01)

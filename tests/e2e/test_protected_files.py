@@ -108,7 +108,7 @@ def place(original: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
 
 
 def protected(command: str) -> list[str]:
-    """Return the files that a command reads, and those of a bake."""
+    """Return the files that a command reads, and the files of a bake."""
     words = WORDS[command]
     found = [word for word in words if Path(word).suffix == ".toml"]
     if words[0].startswith("level"):

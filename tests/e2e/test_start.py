@@ -1,4 +1,4 @@
-"""The first moments of a command, streams that are closed, and the death of the process that waits."""
+"""Ctrl-C while a command starts, commands with closed streams, and a kill of the waiting parent process."""
 
 from __future__ import annotations
 

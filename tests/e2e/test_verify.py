@@ -194,7 +194,7 @@ def test_reports(sound, tmp_path):
     assert text.count("data:image/png;base64,") >= 4 + 9
     assert "http" not in text.replace("http-equiv", "")
     assert "energy_ratio_se" in text
-    # At most 8 columns, so that a table fits a page of 1200 pixels; figures are rows.
+    # Tables have at most 8 columns, so that they fit a page of 1200 pixels.
     assert max(row.count("<th>") for row in text.split("<tr>")) <= 8
     suite = ElementTree.parse(junit).getroot()[0]
     assert int(suite.attrib["tests"]) >= 6

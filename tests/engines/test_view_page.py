@@ -313,14 +313,14 @@ def test_every_switch_shows_its_quantity(page):
     assert close(page.pixel(spot), srgb(page.light[1, row, column] * page.exposure * 2))
     assert page.ask("document.getElementById('exposure-value').innerText") == "+1.0 EV"
     page.show("5", "status")
-    # A texel has the colour of its status in the legend times the brightness of the headlight, which is 1 if
-    # the surface is seen along its normal.
+    # The colour of a texel is the legend's colour of its status, times the brightness of the headlight. The
+    # brightness is 1 for a surface that is seen along its normal.
     for kind, place in ((1, (0.1, 0.1)), (3, (0.25, 0.75)), (4, (0.55, 0.45))):
         row, column = texel_at(painted_uv(*place))
         assert page.status[0, row, column] == kind
         swatch = f"getComputedStyle(document.querySelectorAll('#legend .swatch')[{kind}]).backgroundColor"
         colour = [int(part) for part in re.findall(r"\d+", page.ask(swatch))]
-        # The brightness is 0.55 + 0.45 cos a, where a is the angle between the surface normal and the
+        # In general it is 0.55 + 0.45 cos a, where a is the angle between the surface normal and the
         # direction to the camera.
         x, y, _ = world(PAINTED_AT, *place)
         light = 0.55 + 0.45 * 5 / np.sqrt(x * x + y * y + 25)

@@ -1,8 +1,9 @@
 """The command lines that the guard runs; each list runs in order in a separate folder that has `scenes/`.
 
-A line has the arguments of `baker` as typed in a shell. Lines that begin with @ differ: `@view OUT` starts
-`baker view`, fetches the files that a browser would fetch, and stops it; `@copy FROM TO` and `@remove
-PATH` change files.
+A line has the arguments of `baker` as typed in a shell, or begins with @:
+
+- `@view OUT` starts `baker view`, fetches the files that a browser would fetch, and stops it;
+- `@copy FROM TO` copies a file, and `@remove PATH` removes one.
 """
 
 from __future__ import annotations

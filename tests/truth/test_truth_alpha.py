@@ -36,7 +36,7 @@ def alpha_material(
 
 
 def floor_under(*cards, half=1.0, texels=40, light="directional", **where):
-    """Return a builder and a black floor of 2 x 2 m under square cards at rising heights.
+    """Return a builder, and its black floor of 2 x 2 m under square cards, each 0.1 m above the one before.
 
     cards : functions that add a material to the builder and return its index
     """
@@ -174,8 +174,8 @@ def test_ambient_occlusion_through_blend(alpha):
 def test_sky_through_blend_and_its_own_reflection():
     """A room of coloured glass under a uniform sky: transmitted and reflected light.
 
-    Inside, E = T * pi * L + alpha * albedo * E with T = (1 - alpha) * (1 - alpha * (1 - albedo)); from
-    each point of the glass, only glass is visible.
+    From each point inside, only glass is visible. Therefore E = T * pi * L + alpha * albedo * E with
+    T = (1 - alpha) * (1 - alpha * (1 - albedo)).
     """
     alpha, albedo = 0.4, np.array([0.5, 1.0, 0.0])
     builder = SceneBuilder(96)

@@ -53,7 +53,8 @@ def test_floor_beside_a_long_wall_without_limit(height):
     builder, floor = wall_and_floor(height)
     truth = floor.texel_mean(lambda p: wall_ao(p[..., 0], height))[:, 0]
     found = [ao_rows(builder, floor, seed, ao_distance="inf") for seed in range(SEEDS)]
-    # `slack`: ray origins are raised by 5e-7 of the 400 m scene, that is 0.2 mm of a wall height of 0.3 m.
+    # `slack`: ray origins are raised by 5e-7 of the scene's size of 400 m. These 0.2 mm reduce the height of
+    # the wall above the ray origins.
     assert_unbiased(found, truth, least=0.002, slack=3e-4)
 
 

@@ -39,8 +39,8 @@ def panels(size=48):
     builder = SceneBuilder(size)
     floor = builder.quad((-1.5, 0, -1.5), (0, 0, 3), (3, 0, 0), builder.material(0.0), (16, 16))
     leds = lit(*((r, c) for r in range(3, 64, 6) for c in range(2, 64, 5)))
-    # With `nearest` a lit texel is a square; the bilinear lookups of the other two spread it over 2 x 2
-    # texels.
+    # With `nearest`, a lit texel is a square. The bilinear lookups of the other two panels spread its light
+    # over 2 x 2 texels.
     looks = (
         (RED, lit((50, 5)), 1.0, {}),
         (GREEN, lit((20, 40)), 5.0, {"wrap": ("mirror", "mirror")}),
@@ -104,7 +104,7 @@ def test_the_reference_finds_a_lit_texel():
 
 
 def test_estimators_agree_on_a_screen():
-    """In a room, a coarse texture with lit texels, which random rays can hit, and with holes."""
+    """A screen in a room has a coarse emissive texture with holes. Random rays can hit its lit texels."""
     image = np.zeros((3, 4, 4), np.float32)
     image[1, 2], image[0, 1], image[2, 0] = (9, 2, 4, 1), (3, 8, 3, 1), (5, 5, 5, 0)
     base = np.ones((3, 4, 4), np.float32)
@@ -153,5 +153,6 @@ def test_a_panel_close_to_a_wall_has_no_sparks(nearest):
 
     truth = floor.texel_mean(light)
     assert value.mean() == pytest.approx(truth.mean(), rel=0.01)
-    # With `nearest` the parts are uniform and their light is analytic; otherwise it is sampled.
+    # With `nearest`, the parts of the emitter have constant radiance, and their light is computed in closed
+    # form. With bilinear lookups, it is sampled.
     assert np.abs(value / truth - 1).max() < (0.02 if nearest else 0.15)

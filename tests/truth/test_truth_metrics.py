@@ -85,7 +85,7 @@ def test_beside_a_perpendicular_square(estimator):
 
 
 def test_form_factors_agree_with_quadrature():
-    """Gauss quadrature of Lambert's formula gives the form factors; at a common edge it converges slowly."""
+    """Gauss quadrature of Lambert's formula gives the form factors. It converges slowly at a common edge."""
     spot, weight = np.polynomial.legendre.leggauss(64)
     x, y = np.meshgrid(spot / 2, spot / 2)
     place = np.stack([x, y, 0 * x], axis=-1)

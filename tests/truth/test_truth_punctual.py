@@ -41,8 +41,8 @@ def test_inverse_square_and_cosine_at_every_texel():
     builder.light("point", 3.0, position=light)
     found = floor.values(builder.bake())[..., 0]
     truth = floor.texel_mean(lambda p: 3.0 * point_irradiance(light, p, UP))
-    # Texels are 0.1 m wide and the light is 0.8 m away, so E varies by up to 20 % within a texel; the error
-    # is that of the mean over 16 points.
+    # Texels are 0.1 m wide and the light is 0.8 m away, so E varies by up to 20 % within a texel. The
+    # tolerance is for the mean over 16 points per texel.
     assert_texels(found, truth, 0.02)
     row, column = np.unravel_index(found.argmax(), found.shape)
     brightest = floor.points(1)[row, column, 0]

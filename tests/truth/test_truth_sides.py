@@ -13,7 +13,7 @@ UP = (0.0, 1.0, 0.0)
 
 
 def emitter_over_floor(double_sided, face_down, **settings):
-    """Return the texels of a floor of 2 x 2 m under an emitter of 1 x 1 m at a height of 1 m."""
+    """Return (floor, builder): a floor of 2 x 2 m, and an emitter of 1 x 1 m that is 1 m above it."""
     builder = SceneBuilder(64)
     floor = builder.quad((-1, 0, -1), (0, 0, 2), (2, 0, 0), builder.material(0.0), (16, 16))
     edges = ((1, 0, 0), (0, 0, 1)) if face_down else ((0, 0, 1), (1, 0, 0))
@@ -66,7 +66,8 @@ def test_wall_reflects_what_reaches_it_on_a_side_that_reflects(double_sided, lit
         found.append(floor.mean())
         # The map stores the irradiance of the front, which is 0 if only the back is lit.
         assert np.allclose(wall, 100.0 if lit_front else 0.0, rtol=1e-4)
-    # 60 lx is the radiosity of the wall; the factor is that of perpendicular unit squares with a common edge.
+    # The radiosity of the wall is 60 lx. 0.2 is the form factor of perpendicular unit squares with a common
+    # edge.
     assert_unbiased(found, 60.0 * 0.2000438, least=0.005)
 
 

@@ -34,7 +34,7 @@ def test_indirect_light_is_even_and_known(albedo, position):
         even = 4 * np.pi * INTENSITY * albedo / (1 - albedo) / area
         indirect.append((whole - direct) / even)
         # In a sphere, indirect light is uniform. In an icosphere of 320 flat faces it varies by a few percent
-        # if the light is off the centre; the noise of 64 rays adds to that.
+        # if the light is off the centre. The noise of 64 rays adds to this variation.
         assert indirect[-1].std() < 0.06
     # `slack`: a flat face reflects no light to itself and little to its neighbours, which changes the mean by
     # up to 0.5 %.
@@ -42,7 +42,7 @@ def test_indirect_light_is_even_and_known(albedo, position):
 
 
 def test_error_falls_with_the_square_of_the_edge():
-    """With the light at the centre, E converges to that of a sphere, I (1 + rho / (1 - rho)) / r^2."""
+    """With the light at the centre, E converges to the value in a sphere, I (1 + rho / (1 - rho)) / r^2."""
     truth = INTENSITY / (1 - 0.5)
     error = []
     for level in (0, 1, 2):

@@ -89,7 +89,7 @@ def test_sky_through_black_glass_all_around_has_no_noise():
 
 
 def test_a_pane_elsewhere_leaves_an_unoccluded_light_its_closed_form():
-    """If no pane is between emitter and floor, the analytic light is used although the scene has glass."""
+    """A pane above an emitter does not change the light below it, which is computed in closed form."""
 
     def baked(*panes):
         builder, floor = floor_under(light="", texels=24)
@@ -116,7 +116,7 @@ def test_a_pane_that_stands_in_the_floor_has_a_bright_and_a_dim_side():
 
 
 def test_a_light_behind_a_pane_of_hardly_any_alpha_is_not_taken_for_an_unoccluded_one():
-    """Usually none of the 256 early-out rays is blocked, but their transmittance is below 1."""
+    """The pane usually blocks none of the 256 rays that test for occluders, but transmits less than 1."""
     builder, floor = floor_under(pane((1.0, 0.0, 0.0), 1 / 1024), light="")
     builder.quad((-1, 1, -1), (2, 0, 0), (0, 0, 2), builder.material(0.0, 5.0), (8, 8))
     found = floor.values(builder.bake(bounces=0, samples=64))
@@ -134,7 +134,7 @@ def test_what_is_not_there_colours_nothing():
 
 
 def test_transparent_black_beside_stained_glass():
-    """In a texture with one half red of alpha 0.5 and one transparent black, only the red colours light."""
+    """One half of a texture is red with alpha 0.5, the other is transparent black. Only red colours light."""
     rgba = np.zeros((64, 64, 4))
     rgba[:, 32:] = 1.0, 0.0, 0.0, 0.5
     builder, floor = floor_under(pane((1, 1, 1), 1.0, rgba=rgba), direction=(0, -1, 0))
