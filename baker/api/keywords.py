@@ -137,7 +137,7 @@ class BatchKeywords(TypedDict, total=False):
     # Number of bakes that run at the same time, each in its own process.
     jobs: int
 
-    # Memory limit of all running bakes together, like 8G.
+    # Memory limit of all running bakes together, such as 8G.
     memory: str | float | None
 
     # Only report the jobs that would be baked, with reasons.
@@ -168,10 +168,11 @@ class CheckKeywords(TypedDict, total=False):
     # Mip level at which charts must not bleed together.
     mip: int
 
-    # Folder of an earlier bake whose speed is used to estimate time; default: one beside the scene.
+    # Folder of an earlier bake whose speed is used to estimate time; default: the latest bake of
+    # the scene in a folder beside it.
     rates: str | Path | None
 
-    # Estimate time and memory of a bake; measures ray rates for about a second.
+    # Estimate time and memory of a bake; measures the speed of rays for about a second.
     cost: bool
 
 
@@ -184,7 +185,7 @@ class DiffKeywords(TypedDict, total=False):
     # Also compute the FLIP error of the pages.
     flip: bool
 
-    # Limits: "irradiance.p95 > 0.05, ao.flip > 0.02".
+    # Limits that fail if they are true: "irradiance.p95 > 0.05, ao.flip > 0.02".
     fail_if: str | None
 
     # Seed of all random numbers.
@@ -315,7 +316,7 @@ class VerifyKeywords(TypedDict, total=False):
     # Time for path tracing; `inf` is no limit. Default: 40, or no limit if `spp` is set.
     time_limit: float | None
 
-    # Limits: "irradiance.p95 > 0.05, ao.rmse > 0.02".
+    # Limits that fail if they are true: "irradiance.p95 > 0.05, ao.rmse > 0.02".
     fail_if: str | None
 
     # Seed of all random numbers.

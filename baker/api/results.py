@@ -53,7 +53,7 @@ def verify(
         time_limit : float | None, s, above 0, default None
             Time for path tracing; `inf` is no limit. Default: 40, or no limit if `spp` is set.
         fail_if : str | None, default None
-            Limits: "irradiance.p95 > 0.05, ao.rmse > 0.02".
+            Limits that fail if they are true: "irradiance.p95 > 0.05, ao.rmse > 0.02".
         seed : int, 0 to 2147483647, default 0
             Seed of all random numbers.
         threads : int | None, 1 to 1024, default None
@@ -119,7 +119,7 @@ def diff(
         flip : bool, default True
             Also compute the FLIP error of the pages.
         fail_if : str | None, default None
-            Limits: "irradiance.p95 > 0.05, ao.flip > 0.02".
+            Limits that fail if they are true: "irradiance.p95 > 0.05, ao.flip > 0.02".
         seed : int, 0 to 2147483647, default 0
             Seed of all random numbers.
         threads : int | None, 1 to 1024, default None
@@ -338,7 +338,7 @@ def batch(
         jobs : int, 1 to 1024, default 1
             Number of bakes that run at the same time, each in its own process.
         memory : str | float | None, bytes, default None
-            Memory limit of all running bakes together, like 8G.
+            Memory limit of all running bakes together, such as 8G.
         dry_run : bool, default False
             Only report the jobs that would be baked, with reasons.
         fail_fast : bool, default False

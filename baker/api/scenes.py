@@ -90,9 +90,10 @@ def check(
         mip : int, 0 to 14, default 2
             Mip level at which charts must not bleed together.
         rates : str | Path | None, default None
-            Folder of an earlier bake whose speed is used to estimate time; default: one beside the scene.
+            Folder of an earlier bake whose speed is used to estimate time; default: the latest bake of the
+            scene in a folder beside it.
         cost : bool, default False
-            Estimate time and memory of a bake; measures ray rates for about a second.
+            Estimate time and memory of a bake; measures the speed of rays for about a second.
 
     Returns
     -------

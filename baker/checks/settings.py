@@ -35,10 +35,13 @@ class CheckSettings(Settings):
     mip: int = setting(DEFAULT_MIP, "Mip level at which charts must not bleed together.", ge=0, le=14)
     rates: Path | None = setting(
         None,
-        "Folder of an earlier bake whose speed is used to estimate time; default: one beside the scene.",
+        "Folder of an earlier bake whose speed is used to estimate time;"
+        " default: the latest bake of the scene in a folder beside it.",
         metavar="OUT",
     )
-    cost: bool = setting(False, "Estimate time and memory of a bake; measures ray rates for about a second.")
+    cost: bool = setting(
+        False, "Estimate time and memory of a bake; measures the speed of rays for about a second."
+    )
 
 
 def with_extras(settings: CheckSettings, scene: Scene) -> CheckSettings:

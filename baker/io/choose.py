@@ -56,7 +56,8 @@ def choose_objects(scene: Scene, include: Sequence[str], exclude: Sequence[str])
     lights = tuple(light for light in scene.lights if not left_out(light.node, light.name))
     used = sorted({i.mesh for i in instances})
     number = {old: new for new, old in enumerate(used)}
-    # Do this before `unused` is computed: a pattern may match an instance that only the source scene has.
+    # Call this before `unused` is computed, because a pattern may match an instance that only the source
+    # scene contains.
     source = None if scene.source_scene is None else _choose_source(scene.source_scene, kept)
     unused = [p for p in (*include, *exclude) if p not in names.matched]
     return replace(

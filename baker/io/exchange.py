@@ -1,4 +1,4 @@
-"""Exchanges two folders atomically: at no time is either path missing.
+"""Exchanges two files or folders atomically: both paths exist at all times.
 
 Based on: renameat2(2) of Linux with RENAME_EXCHANGE, renamex_np(2) of macOS with RENAME_SWAP.
 """

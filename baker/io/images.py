@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 _FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF")
 # Largest width and height of an image that is read, texels.
 _LARGEST = 16384
-# Number of image rows that are converted at a time; even, so that a 2 x 2 block lies in one strip.
+# Number of image rows that are converted at a time. It is even, so that each block of 2 x 2 texels lies in
+# one strip.
 _STRIP = 32
 
 

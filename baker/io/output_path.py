@@ -1,4 +1,4 @@
-"""Checks names of outputs that no file or folder can be written to."""
+"""Refuses output paths that cannot be written because of their name or their links."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def resolved_output(out: Path) -> Path:
     Raises
     ------
     SettingsError
-        If its links form a loop, or its name is not text.
+        If the links in the path form a loop, or the path is not text.
     """
     path = Path(os.path.realpath(out))
     if any(part.is_symlink() for part in (path, *path.parents)):
@@ -36,9 +36,10 @@ def resolved_output(out: Path) -> Path:
 
 
 def not_text(path: Path) -> str | None:
-    """Return why the libraries that read and write images cannot open a path; None if they can.
+    """Return the reason if a path is not text, else None.
 
-    Names of files are bytes. Those that the encoding of the system cannot decode are no text.
+    File names are bytes, which the encoding of the system may not be able to decode. The libraries that read
+    and write images cannot open such files.
     """
     try:
         str(path).encode("utf-8")

@@ -15,22 +15,22 @@ _ALWAYS = frozenset({MANIFEST_NAME, "scene.glb"})
 
 
 def check_outputs(outputs: Mapping[str, Path], inputs: Iterable[Path]) -> None:
-    """Check, before the work, that no output replaces something that the user needs.
+    """Raise an error before the work starts if an output would replace an input or a file of a bake.
 
     Parameters
     ----------
     outputs : mapping of str to Path
         Files and folders to write, by the name of their setting, such as "sarif".
     inputs : iterable of Path
-        Scenes, settings, lists of jobs: the files themselves and those that scenes refer to are protected.
+        Scenes, configuration files and job files. The files that the scenes refer to are protected as well.
 
     Raises
     ------
     SettingsError
-        If an output is an input, a file of a bake, or the same file as another output, by its path or through
-        links; or a folder in which the files of a bake would replace an input.
+        If an output is an input, a file of a bake, or the same file as another output; links are followed.
+        Also if an output is a folder in which a bake would replace an input.
     """
-    # Only files that exist can be replaced, so most runs read nothing here.
+    # Read the scenes only if an output exists, because a new output cannot replace a file.
     files = {name: path for name, path in outputs.items() if is_file(path)}
     folders = {name: path for name, path in outputs.items() if path.is_dir()}
     if files or folders:

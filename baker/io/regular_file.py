@@ -33,7 +33,8 @@ def read_regular(path: Path | str, *, most: int = LARGEST, first: int | None = N
     most : int
         Largest accepted size, bytes; a larger file is refused before it is read.
     first : int, optional
-        Read only the first bytes, at most this number; `most` then limits what is read.
+        Read only the first bytes, at most this number. `most` then limits the number of bytes that are read
+        and not the size of the file.
 
     Returns
     -------
@@ -55,7 +56,7 @@ def read_regular(path: Path | str, *, most: int = LARGEST, first: int | None = N
     with os.fdopen(file, "rb") as stream:
         found = os.fstat(stream.fileno())
         _check(path, found.st_mode)
-        # Read enough to recognise a pointer, whatever `first` is.
+        # Read at least as many bytes as are needed to recognise a Git LFS pointer.
         size = found.st_size if first is None else min(found.st_size, max(first, len(_LFS)))
         if size > most:
             raise OSError(errno.EFBIG, f"it has {size} bytes; at most {most} are read", str(path))

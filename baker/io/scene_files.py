@@ -24,8 +24,8 @@ def scene_files(path: Path) -> list[Path]:
     Returns
     -------
     list of Path
-        Also files that do not exist, since a reference may stand for several names. Only `path` if the file
-        cannot be read or has a format without references.
+        Some of the files may not exist, because a reference may stand for several names. The list is only
+        `path` if the file cannot be read or its format has no references.
     """
     try:
         if path.suffix.lower() in (".glb", ".gltf"):
@@ -38,7 +38,7 @@ def scene_files(path: Path) -> list[Path]:
 
 
 def _gltf_names(data: bytes, file: str) -> Iterator[str]:
-    """Yield the file names of all members "uri" of a document, those of extensions among them."""
+    """Yield the file names in all members "uri" of a document, including members of extensions."""
     text = split_glb(data, file).json if data[:4] == MAGIC else data
     waiting: list[Any] = [json.loads(text.decode("utf-8-sig"))]
     while waiting:
@@ -64,10 +64,10 @@ def _obj_files(path: Path) -> Iterator[Path]:
 
 
 def _statements(path: Path, keys: tuple[str, ...]) -> Iterator[str]:
-    """Yield what may be a file name after keywords that begin with one of `keys`."""
+    """Yield the words that may be a file name in the statements whose keyword begins with one of `keys`."""
     for line in read_regular(path, most=LARGEST_PART).decode("utf-8", "replace").splitlines():
         if line.lstrip()[:6].lower().startswith(keys):
             words = line.replace("\\", "/").split()[1:]
-            # Options may stand before a name, and a name may contain blanks.
+            # Yield single words and the ends of the line: a name may follow options and contain blanks.
             yield from words
             yield from (" ".join(words[k:]) for k in range(min(len(words), 20)))

@@ -1,10 +1,10 @@
 """Creates and finds the temporary folders that output is written to before it is moved to its final path.
 
-The folder for an output `out` is `.{out.name}.baker-{process}-{random hex digits}` beside it. If `out` is a
-folder that cannot be moved, the folder is `.baker-{process}-{random hex digits}` inside `out`. The process
-that creates the folder holds a lock on it. A folder that is not locked was left by a killed process, even if
-a new process has the same id. On file systems without locks, a folder was left by a killed process if no
-process with its id exists.
+The temporary folder for an output `out` is `.{out.name}.baker-{process}-{random hex digits}` beside `out`,
+where `process` is the id of the process that creates it. If `out` is a folder that cannot be moved, it is
+`.baker-{process}-{random hex digits}` inside `out`. The process holds a lock on the temporary folder. If a
+temporary folder is not locked, a killed process has left it, even if a new process has the same id. On file
+systems without locks, a killed process has left the folder if no process with this id exists.
 """
 
 from __future__ import annotations

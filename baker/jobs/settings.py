@@ -16,7 +16,7 @@ class BatchSettings(Settings):
         1, "Number of bakes that run at the same time, each in its own process.", ge=1, le=1024
     )
     memory: Text | None = setting(
-        None, "Memory limit of all running bakes together, like 8G.", unit="bytes", metavar="SIZE"
+        None, "Memory limit of all running bakes together, such as 8G.", unit="bytes", metavar="SIZE"
     )
     dry_run: bool = setting(False, "Only report the jobs that would be baked, with reasons.")
     fail_fast: bool = setting(False, "Start no further jobs after a failure.")

@@ -1,8 +1,8 @@
 """Finds the faces that can be removed without a visible change: degenerate faces and exact duplicates.
 
-A duplicate face is removed only if no renderer can distinguish it from an earlier face. Both then have the
+A duplicate face is removed only if no renderer can distinguish it from an earlier face: both faces have the
 same corners with the same attributes, and the material does not blend. Faces at the same positions with
-different attributes are kept, because it depends on the renderer which of them is visible.
+different attributes are kept, because renderers differ in which of them they show.
 """
 
 from __future__ import annotations

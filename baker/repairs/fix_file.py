@@ -169,7 +169,7 @@ def fix_file(path: Path, settings: RepairSettings | None = None, progress: Progr
 
 
 def _joined(first: FixResult, second: FixResult) -> FixResult:
-    """Return the result of two successive steps; a defect that neither step fixed is listed once."""
+    """Combine the results of two successive calls of `_fix`; a defect that neither fixed is listed once."""
     left = dict.fromkeys((*first.left_alone, *second.left_alone))
     return FixResult(second.data, (*first.fixed, *second.fixed), tuple(left))
 
@@ -217,7 +217,7 @@ def _fix(
 
 
 def _repair(scene: Scene, first: FixResult, progress: Progress) -> FixResult:
-    """Repair the shapes of a fixed scene, whose fixes are in `first`. They are listed before the repairs."""
+    """Repair the shapes of a fixed scene. The result lists the fixes in `first` before the repairs."""
     source, source_scene = _parsed(scene)
     made: dict[tuple[int, int], EditedPrimitive | ReplacedPrimitive] = {}
     fixed, left = list(first.fixed), []
@@ -261,12 +261,15 @@ def _read_glb(path: Path, data: bytes, *, allow_outside: bool) -> Scene:
 
 
 def _within(progress: Progress, number: int, count: int) -> Progress:
-    """Return a progress callback that converts a fraction of mesh `number` to that of all `count` meshes."""
+    """Return a progress callback that converts a fraction of mesh `number` to one of all `count` meshes."""
     return lambda stage, fraction, detail="": progress(Stage.FIX, (number + fraction) / count, detail)
 
 
 def _area_shares(source_scene: SourceScene) -> NDArray[np.float64]:
-    """Return each mesh's share of the total area in world space, (M,) float64, by its first instance."""
+    """Return each mesh's share of the total area in world space, (M,) float64.
+
+    The area of a mesh is that of its first instance.
+    """
     area = np.zeros(len(source_scene.meshes))
     for instance in source_scene.instances:
         if area[instance.mesh] == 0.0:
@@ -281,7 +284,7 @@ def _area_shares(source_scene: SourceScene) -> NDArray[np.float64]:
 
 
 def _in_range(arrays: SourcePrimitive) -> NDArray[np.bool_]:
-    """Return (T,) bool: the faces all of whose indices are those of existing vertices."""
+    """Return (T,) bool: the faces whose three indices refer to existing vertices."""
     n = np.full(len(arrays.triangle), len(arrays.position))
     return in_range(arrays.triangle, np.zeros_like(n), n)
 

@@ -41,7 +41,7 @@ class UvRequest:
     threads: int | None
 
     def unwrap_settings(self) -> BakeSettings:
-        """Return settings that unwrap the mesh alone on a page as large as its share of a page.
+        """Return settings that unwrap the mesh alone on a page whose area is `share` of the full page.
 
         The page is square, and its width is a multiple of 16 texels.
         """

@@ -35,7 +35,7 @@ class MeshRepair:
 
 
 def repair_mesh(primitives: list[EditablePrimitive], textured: bool, shown: SourceInstance) -> MeshRepair:
-    """Repair one mesh, unless the repair would move its surface by more than `FURTHEST` of its diagonal.
+    """Repair one mesh. If the repair would move its surface too far, see `FURTHEST`, the mesh is unchanged.
 
     Parameters
     ----------

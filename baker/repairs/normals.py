@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from baker.topology.triangle_check import face_normal
 
-# Largest deviation of a normal's length from 1 that is accepted. Smaller deviations are rounding.
+# Largest deviation of a normal's length from 1 that is accepted. Rounding causes smaller deviations.
 LENGTH_SLACK = 1e-2
 
 
@@ -93,7 +93,7 @@ def choose_normals(
         for axis in range(3):
             smooth[:, axis] = np.bincount(triangle.ravel(), np.repeat(face[:, axis], 3), minlength=len(given))
         size = np.bincount(triangle.ravel(), np.repeat(np.linalg.norm(face, axis=1), 3), minlength=len(given))
-        # If this mean is nearly zero, use the normal of each corner's face.
+        # If the mean is nearly zero, replace the normal at each corner by the normal of its face.
         lost = np.linalg.norm(smooth, axis=1) <= 1e-6 * size
         made = np.where(lost[triangle][..., None], face[:, None, :], smooth[triangle])
         filled = _unit(made.reshape(-1, 3)).reshape(-1, 3, 3).astype(np.float32)

@@ -12,8 +12,8 @@ from baker.repairs.primitive_edit import PrimitiveEdit
 from baker.repairs.welded_mesh import WeldedMesh
 from baker.topology.slivers import find_slivers
 
-# Share of slivers, and number of faces, from which a mesh is remeshed. The second excludes modelled objects
-# such as a wall of two triangles.
+# A mesh is remeshed if at least this share of its faces are slivers, and if it has at least this number of
+# faces. The number of faces excludes modelled objects such as a wall of two triangles.
 MOST_SLIVERS = 0.1
 FEWEST_FACES = 500
 

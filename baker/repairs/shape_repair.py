@@ -1,7 +1,7 @@
 """Repairs the shape of a mesh: edges of more than two faces, inconsistent winding, and small holes.
 
-Faces and vertices keep all attributes of the file. The faces that close a hole, its patch, use the vertices
-at the border of the hole.
+Faces and vertices keep all attributes of the file. The faces that close a hole are called its patch. They use
+the vertices at the border of the hole.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ HOLE_SIZE = 0.05
 FURTHEST = 0.01
 # Largest area that may be removed, as a share of the mesh's area.
 LARGEST_LOSS = 0.01
-# Cosine of the angle between the normal of a patch face and a vertex normal at the border of the hole. Below
-# it, the corner gets the normal of the face instead.
+# Cosine of the angle between the normal of a patch face and a vertex normal at the border of the hole. If the
+# cosine is smaller, this corner of the face gets the face normal instead of the vertex normal.
 _SAME_SIDE = 0.7
 # Share of faces without any neighbour above which a mesh counts as a triangle soup.
 SOUP = 0.5
@@ -165,7 +165,7 @@ def _close_holes(mesh: WeldedMesh, changes: list[Change]) -> tuple[WeldedMesh, N
         new = new[_small(mesh, new)]
     if not len(new):
         return mesh, np.zeros(n, bool)
-    # For each corner of the patches, use the vertex of the first face with a corner at the same position.
+    # For each corner of a patch, use the vertex of the first face that has a corner at the same position.
     order = np.argsort(mesh.triangle.ravel(), kind="stable")
     at = order[np.searchsorted(mesh.triangle.ravel()[order], new.ravel())].reshape(-1, 3)
     owner = mesh.owner[at[:, 0] // 3]

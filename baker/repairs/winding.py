@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from baker.topology.weld import connected, number_by_first
 
-# |area-weighted mean of sign(vertex normal . face normal)| of a piece, above which rule 1 applies. The mean
-# is computed with all faces wound consistently with the first face of the piece.
+# Rule 1 applies if |m| is above this value, where m is the area-weighted mean of sign(vertex normal . face
+# normal) over a piece. For this mean, all faces are wound consistently with the first face of the piece.
 _CLEAR = 0.5
 
 

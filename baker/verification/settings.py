@@ -28,7 +28,9 @@ class VerifySettings(Settings):
         metavar="SECONDS",
         gt=0,
     )
-    fail_if: str | None = setting(None, 'Limits: "irradiance.p95 > 0.05, ao.rmse > 0.02".', metavar="EXPR")
+    fail_if: str | None = setting(
+        None, 'Limits that fail if they are true: "irradiance.p95 > 0.05, ao.rmse > 0.02".', metavar="EXPR"
+    )
     seed: int = seed_setting()
     threads: int | None = threads_setting()
 

@@ -32,7 +32,7 @@ class OutputLock:
         self._file: int | None = None
 
     def acquire(self) -> bool:
-        """Try to take the lock without waiting; return False if another run holds it.
+        """Try to take the lock without waiting. Return False if another run holds it or has just released it.
 
         Raises
         ------
@@ -46,7 +46,7 @@ class OutputLock:
         try:
             file = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o644)
         except FileNotFoundError:
-            return False  # another run has just removed an empty parent folder
+            return False  # another run has just removed a parent folder
         try:
             if try_lock(file) and is_at(file, self.path):
                 self._file = file
@@ -62,7 +62,7 @@ class OutputLock:
         """Release the lock; delete the lock file and those parent folders that `acquire` created."""
         if self._file is None:
             return
-        # Delete the file before the release: afterwards, another run could already have locked it.
+        # Delete the file before the release, because another run could lock the file after the release.
         with contextlib.suppress(OSError):
             self.path.unlink()
         os.close(self._file)
@@ -78,8 +78,8 @@ class OutputLock:
 def held(out: Path) -> Iterator[None]:
     """Hold the lock of an output folder within a `with` block, without waiting for other runs.
 
-    If no lock file can be created beside the folder, for example because it is a mount point, the `with`
-    block runs without a lock.
+    If no lock file can be created beside the output folder, the `with` block runs without a lock. An example
+    is a mount point in a folder that is not writable.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def held(out: Path) -> Iterator[None]:
     """
     lock = OutputLock(out)
     try:
-        # Try twice: the first attempt also fails if the other run deletes the lock file in the meantime.
+        # Try twice, because the first attempt also fails if another run releases the lock at the same time.
         free = lock.acquire() or lock.acquire() or not lock.path.exists()
     except OSError:
         free = True

@@ -12,8 +12,11 @@ _MOUNT_TABLE = Path("/proc/self/mountinfo")
 def cannot_move(folder: Path) -> bool:
     """Return whether a folder cannot be renamed.
 
-    True for a mount point, a folder that contains a mount point, a folder in a read-only parent, and a folder
-    that is or contains the current folder of this process, because a shell may be in it.
+    True is returned for
+
+    - a mount point, and a folder that contains a mount point;
+    - a folder whose parent is not writable;
+    - the current folder of this process and its parents, because a shell may be in that folder.
 
     Parameters
     ----------

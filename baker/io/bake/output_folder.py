@@ -1,9 +1,9 @@
 """Replaces an output folder as a whole: after an error it contains the complete old bake.
 
 All files are written to a temporary folder beside the output folder. At the end, the file system exchanges
-the two folders in one atomic step. If the output folder cannot be renamed (a mount point, the current
-folder), or the file system does not support the exchange, the files are moved one by one. A journal records
-these moves, and `recovery` undoes them if the process was killed in between.
+the two folders in one atomic step. In two cases the files are moved one by one instead: if the output folder
+cannot be renamed (see `baker.io.bake.mounts`), or if the file system does not support the exchange. A journal
+records these moves. If the process is killed before the last of them, `baker.io.bake.recovery` undoes them.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None)
     Raises
     ------
     SettingsError
-        If `out` is a file or no possible name of a folder, if it contains files that baker did not write and
-        `force` is False, or if the bake would replace the input.
+        If `out` is a file or a name that no folder can have, if it contains files that baker did not write
+        and `force` is False, or if the bake would replace the input.
     ResourceError
         If the folder cannot be read or written to.
     """
@@ -206,7 +206,7 @@ class OutputFolder:
             try:
                 self._made.pop().rmdir()
             except OSError:
-                # Another process has created files there.
+                # Another process has created files in this folder, so its parents are not empty either.
                 self._made.clear()
 
     def _replace(self) -> None:

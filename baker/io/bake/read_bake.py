@@ -39,8 +39,8 @@ class StoredBake:
     scene : Scene
         The content of `scene.glb`; the sky is in `manifest["settings"]`.
     atlas : Atlas
-        Lightmap uv from TEXCOORD_1 of `scene.glb`, page numbers from the manifest. All triangles of an
-        instance form one chart, whose number is the index of the instance.
+        The lightmap uv are TEXCOORD_1 of `scene.glb`; the page numbers are from the manifest. All triangles
+        of an instance form one chart, whose number is the index of the instance.
     maps : dict of str to (P, H, W, C) float32
         For each channel, P pages of H x W texels with C components.
     status : (P, H, W) uint8, `core.lightmap.TexelStatus`

@@ -26,7 +26,7 @@ _SHORT = 60
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Return the manifest of a bake; first call `recover`, in case a killed process was writing the folder.
+    """Call `recover`, because a killed process may have left the folder incomplete, and return the manifest.
 
     Parameters
     ----------
@@ -36,8 +36,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        The manifest, valid by the schema. All page numbers exist, no node and no file is named twice, every
-        file name is a path inside the folder, and the numbers of instances are finite.
+        The manifest, valid by the schema. All page numbers exist. No node and no file occurs twice. Every
+        file name is a path inside the folder. The numbers of each instance are finite.
 
     Raises
     ------

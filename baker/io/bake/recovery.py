@@ -1,8 +1,9 @@
 """Exchanges the files of an output folder one by one, and undoes an exchange that was interrupted.
 
-This is for folders that cannot be renamed. Before the first file is moved, the exchange is recorded in a
-journal beside the new files. The new manifest is moved last. If the process is killed before that, `recover`
-in a later command restores the old files. After that, the new bake is complete.
+Folders that cannot be renamed are replaced in this way. Before the first file is moved, the exchange is
+recorded in a journal beside the new files. The new manifest is moved last. If the process is killed before
+the move of the manifest, `recover` in a later command restores the old files. After this move, the new bake
+is complete.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from baker.io.temporary import claim, temporaries
 MANIFEST_NAME = "bake.json"
 # Names in a temporary folder: folder of the new files, folder of the old files during the exchange, journal.
 NEW, OLD, JOURNAL = "new", "old", "journal.json"
-# Relative path with forward slashes. No component is "." or "..", or contains a backslash or a colon.
+# A relative path with forward slashes. No component is "." or "..", and none contains a backslash or a colon.
 _FILE_NAME = re.compile(r"(?!\.{1,2}(/|$))[^/\\:]+(/(?!\.{1,2}(/|$))[^/\\:]+)*")
 
 
@@ -49,7 +50,7 @@ def exchange_files(home: Path, out: Path, old: Collection[str], new: Collection[
     Raises
     ------
     OSError
-        If a file cannot be moved; call `undo`.
+        If a file cannot be moved. The caller then calls `undo`.
     """
     leaving = [name for name in _manifest_first({*old, *new}) if os.path.lexists(out / name)]
     for name in leaving:
@@ -70,7 +71,7 @@ def exchange_files(home: Path, out: Path, old: Collection[str], new: Collection[
 
 
 def undo(home: Path, out: Path) -> None:
-    """Undo an interrupted exchange; do nothing if it is complete. An interrupted call can be repeated.
+    """Undo an interrupted exchange, or do nothing if it is complete. `undo` can itself be called again.
 
     Parameters
     ----------
@@ -116,7 +117,7 @@ def recover(out: Path) -> None:
     try:
         target = Path(os.path.realpath(out))
     except ValueError:
-        return  # no path at all: it contains a zero byte
+        return  # the name contains a zero byte, so no file can have it
     found = temporaries(target)
     for temporary in found:
         with claim(temporary) as free:
@@ -141,7 +142,7 @@ def abandoned(out: Path) -> bool:
     Returns
     -------
     bool
-        True until `recover` has removed them.
+        True until `recover` has removed all folders that killed processes have left.
     """
     for found in temporaries(out):
         with claim(found) as free:

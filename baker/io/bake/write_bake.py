@@ -33,7 +33,8 @@ STATUS_COLOURS = {
     TexelStatus.UNCONVERGED: (240, 228, 66),
 }
 
-# Share of a page's surface texels, 0 to 1: a warning is given if more texels are banded.
+# Share of a page's surface texels, 0 to 1. If a larger share is banded, see `baker.core.encoding.Loss`, a
+# warning is given.
 BANDED_SHARE = 0.01
 
 
@@ -213,7 +214,7 @@ def encoding_named(name: str) -> Encoding[Any]:
     SettingsError
         If no encoding has this name.
     """
-    # Leave EXR out of the message's list of names: EXR is always written and is no value of `encode`.
+    # Leave EXR out of the names that the message lists, because `encode` does not accept it.
     return ENCODINGS.require(name, "encoding", setting="encode", hidden=(ALWAYS_WRITTEN,))
 
 

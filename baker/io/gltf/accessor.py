@@ -1,4 +1,4 @@
-"""Reads glTF accessors into arrays; they may be strided, normalised, sparse, or zeros without a buffer view.
+"""Reads glTF accessors into arrays: also strided, normalised and sparse ones, and ones without a buffer view.
 
 Based on: Khronos Group, glTF 2.0 Specification, section 3.6.2.
 """

@@ -121,7 +121,7 @@ def _substitute(
     rows: NDArray[np.int32],
     data: NDArray[np.uint8],
 ) -> None:
-    """Overwrite rows of `data` (row i is element `rows[i]`) for which there is a sparse value."""
+    """Overwrite the rows of `data` whose element has a sparse value; row i of `data` is element `rows[i]`."""
     sparse: dict[str, Any] = accessor["sparse"]
     count, size = sparse["count"], element_size(accessor)
     dtype = COMPONENT[sparse["indices"]["componentType"]]

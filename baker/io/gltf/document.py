@@ -50,7 +50,8 @@ IRRELEVANT = frozenset(
 )
 # Top-level members that must be lists, because the writer of scene.glb may append to them.
 _LISTS = ("accessors", "bufferViews", "materials", "meshes", "nodes", "images", "samplers", "textures")
-# Ignored extensions that `material.py` reports for each material, so that `_check_extensions` does not.
+# Ignored extensions that `_check_extensions` does not report, because `material.py` reports them for each
+# material.
 _REPORTED = frozenset({"KHR_materials_transmission"})
 # Largest depth of objects and lists in each other.
 _DEEPEST = 100

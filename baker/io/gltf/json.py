@@ -23,7 +23,7 @@ class JsonObject:
         Name of the file, for messages.
     """
 
-    # Files may have a million objects.
+    # Use slots to save memory, because files may have a million objects.
     __slots__ = ("_lists", "_value", "file", "where")
 
     def __init__(self, value: Any, where: str, file: str) -> None:
@@ -72,7 +72,7 @@ class JsonObject:
         return value
 
     def index(self, key: str, count: int, what: str, default: int | None = None) -> int:
-        """Return an index below `count`; `what` is the plural noun for the indexed items in messages."""
+        """Return an index from 0 to `count` - 1; `what` is the plural of the indexed items, for messages."""
         value = self.integer(key, default)
         if value >= count:
             self.fail(f"{value} is out of range: the file has {count} {what}", key)

@@ -18,9 +18,9 @@ from baker.core.scene import PunctualLight, SceneWarning
 from baker.io.gltf.json import JsonObject
 from baker.io.gltf.node import Placed
 
-# Length of the node's -Z axis in world space, divided by the largest singular value of the node's matrix: a
-# spot or directional light below it is left out. Its direction would be rounding noise, because exporters
-# write single precision.
+# Length of the node's -Z axis in world space, divided by the largest singular value of the node's matrix.
+# Spot and directional lights with a smaller ratio are left out. Their direction would consist of rounding
+# errors, because exporters write single precision.
 _FLATTEST = 1e-6
 _TINY = float(np.finfo(np.float64).tiny)
 

@@ -67,7 +67,7 @@ def place_nodes(nodes: Sequence[JsonObject], roots: Sequence[int]) -> list[Place
         if visibility is not None and not visibility.boolean("visible", True):
             continue
         matrix = outer
-        # Files may have a million nodes without a transform of their own.
+        # Skip the product for nodes without a transform, because files may have a million of them.
         if _MOVING & node.value.keys():
             with np.errstate(over="ignore", invalid="ignore"):
                 matrix = outer @ local_matrix(node)

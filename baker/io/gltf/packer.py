@@ -62,8 +62,8 @@ class Packer:
     buffers : tuple of bytes
         The buffers of the document.
     replaced : set of int
-        Accessors that the rewritten primitives used before. Those that nothing else in the document may refer
-        to are dropped.
+        Accessors that the rewritten primitives used before. An accessor is dropped if nothing else in the
+        document can refer to it.
     missing : set of int
         Indices of buffers that cannot be read. Their entries stay in the document, after the single buffer.
 
@@ -252,7 +252,7 @@ def _tidy(items: list[Json], free: list[int], blank: Json) -> None:
 
 
 def _unused(document: Json, replaced: frozenset[int]) -> tuple[list[int], list[int]]:
-    """Return the replaced accessors that nothing else may refer to, and their views that are then unused."""
+    """Return the indices of replaced accessors that nothing else can refer to, and of views only they use."""
     used: set[int] = set()
     for _, mesh in objects(document, "meshes"):
         for _, primitive in objects(mesh, "primitives"):
@@ -321,7 +321,7 @@ def _merge(
     chunks: list[bytes] = []
     length = 0
     holders = [(index, view) for index, view in enumerate(views) if isinstance(view, dict)]
-    # The compression extensions of views have `buffer` and `byteOffset` as well, so update them like views.
+    # Compression extensions of views have `buffer` and `byteOffset` as well, so update them in the same way.
     holders += [
         (-1, extension)
         for _, view in holders
@@ -334,7 +334,7 @@ def _merge(
             continue
         words = np.frombuffer(data + b"\0" * (-len(data) % 4), np.uint32)
         drop = np.zeros(len(words), bool)
-        # Leave views that exceed their buffer unchanged: nothing that is baked needs them.
+        # Leave views that exceed their buffer unchanged, because baking does not need their data.
         mine = [
             (index, holder, span)
             for index, holder in holders

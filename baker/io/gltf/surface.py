@@ -17,8 +17,8 @@ from baker.io.gltf.json import JsonObject
 # Albedo of a material whose reflection model is unknown, 0 to 1.
 UNKNOWN_ALBEDO = 0.5
 _GLOSSY = "KHR_materials_pbrSpecularGlossiness"
-# Extensions that add to pbrMetallicRoughness. A material with no other extensions and no base colour is
-# white, the default of glTF.
+# Extensions that do not replace pbrMetallicRoughness. If a material has no base colour and only extensions of
+# this list, it is white, the default of glTF.
 _LAYERS = (
     UNDERSTOOD
     | IRRELEVANT

@@ -67,7 +67,7 @@ def unreadable_textures(
     read : set of (str, str)
         The textures that are read for baking, each as (path of the JSON object that contains it, its key).
     reported : set of int
-        Indices of images; those that the warnings name are added.
+        Indices of images. The images that the returned warnings name are added.
 
     Returns
     -------

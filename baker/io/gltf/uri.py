@@ -48,7 +48,8 @@ def read_uri(uri: str, folder: SceneFolder, *, first: int | None = None) -> byte
     UriError
         If there is no such file, it cannot be read, or the data URI is malformed.
     OutsideName
-        If a file name that the URI may stand for is outside the scene's folder, and no other one exists.
+        If none of the file names that the URI may stand for exists inside the scene's folder, and one of them
+        is outside.
     """
     if is_data(uri):
         return _decode_data(uri)

@@ -145,8 +145,9 @@ def _rewrite(
 def _own_meshes(document: Json, source: Json, instances: tuple[Instance, ...]) -> list[int]:
     """Assign a separate mesh to every baked node, and return the mesh index of each instance.
 
-    The first instance of a mesh keeps its index; the others get appended copies. If a node that is not baked
-    (for example in another scene) uses the mesh, all baked instances get copies.
+    The first instance of a mesh keeps the mesh's index; for the other instances, copies of the mesh are
+    appended. If a node that is not baked (for example in another scene) uses the mesh, all baked instances
+    get copies.
     """
     baked = {instance.node for instance in instances}
     if len(baked) < len(instances):
@@ -180,7 +181,7 @@ def _split(mesh: Mesh, layout: InstanceLayout, output: list[Json], source: list[
 
 
 def _rewrite_primitive(packer: Packer, source: SourceDocument, piece: _Piece, *, ao: bool) -> int | None:
-    """Write the vertices in lightmap order; return the new number of an old TEXCOORD_1, or None."""
+    """Write the lightmap vertices of a piece. Return the new TEXCOORD number of the old set 1, or None."""
     attributes = dict(piece.source["attributes"])
     moved = None
     old = attributes.pop("TEXCOORD_1", None)

@@ -99,7 +99,9 @@ def _replace(packer: Packer, primitive: Json, new: ReplacedPrimitive) -> None:
 
 
 def _turn_handedness(data: NDArray[np.uint8], accessor: Json, turned: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Negate w of the tangents, (V, B) bytes, whose normals were reversed; their bitangents stay the same.
+    """Return the tangents `data` (V, B), as bytes, with w negated at the vertices `turned` (V,).
+
+    The normals of these vertices were reversed. Negating w keeps their bitangents.
 
     The bitangent is cross(normal, tangent.xyz) * tangent.w (glTF 2.0, section 3.7.2.1).
     """

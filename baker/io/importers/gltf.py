@@ -29,10 +29,11 @@ from baker.io.load import IMPORTERS, SceneFile
 from baker.io.mesh.build import build_mesh
 from baker.topology.triangle_check import LARGEST_COORDINATE
 
-# Smallest / largest singular value of a node's matrix: below this ratio the instance is left out as flat.
+# Smallest divided by largest singular value of a node's matrix. Below this ratio, the instance is flat and is
+# left out.
 _FLATTEST = 1e-7
 
-# Index of the mesh; index of the node if the node has a skin, else None.
+# Key of a built mesh: the index of the mesh, and the index of the node if the node has a skin, else None.
 _Key = tuple[int, int | None]
 
 
@@ -117,7 +118,7 @@ def import_gltf(source: SceneFile) -> Scene:
 def _choose_scene(
     document: GltfDocument, asked: int | None, warnings: list[SceneWarning], *, lenient: bool
 ) -> tuple[int | None, list[Placed]]:
-    """Return the index of the chosen scene, or None if the file has no scenes, and the scene's nodes."""
+    """Return the index of the chosen scene (None if the file has no scenes), and the scene's nodes."""
     root = document.root
     scenes, nodes = root.children("scenes"), root.children("nodes")
     if asked is not None and not 0 <= asked < len(scenes):
@@ -143,7 +144,7 @@ def _instances(
     *,
     lenient: bool,
 ) -> tuple[list[Mesh], list[Instance], SourceScene | None]:
-    """Return the meshes in use, each once, their instances, and the source scene (None unless lenient)."""
+    """Return the distinct meshes in use, the instances, and the source scene (None unless `lenient`)."""
     sources = document.root.children("meshes")
     poser = Poser(document)
     built: dict[_Key, _Built] = {}

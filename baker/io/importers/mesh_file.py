@@ -30,7 +30,7 @@ _GREY = Material(name="default", base_colour=(0.8, 0.8, 0.8, 1.0), metallic=0.0)
 @IMPORTERS.register(".stl")
 @IMPORTERS.register(".off")
 def import_mesh_file(source: SceneFile) -> Scene:
-    """Read a PLY, STL or OFF file as a grey mesh, times its vertex colours if the file has them.
+    """Read a PLY, STL or OFF file. The base colour is grey, multiplied by vertex colours if there are any.
 
     Parameters
     ----------

@@ -28,7 +28,8 @@ from baker.io.mesh.mtl import read_mtl
 from baker.io.mesh.scene import scene_of_meshes, to_world
 from baker.io.scene_folder import OutsideError, OutsideName, SceneFolder
 
-# Albedo 0.8, not glTF's default of 1, because a white surface absorbs no light.
+# Material of faces without a known material. Its albedo is 0.8 and not 1, the default of glTF, because a
+# white surface absorbs no light.
 GREY = Material(name="default", base_colour=(0.8, 0.8, 0.8, 1.0), metallic=0.0)
 _VERTEX = re.compile(rb"^[ \t]*v[ \t]([^\r\n#]*)", re.MULTILINE)
 _NOT_NUMBERS = re.compile(rb"^[ \t]*v[ \t][^\r\n#]*[^0-9eE+\-. \t\r\n#]", re.MULTILINE)
@@ -230,7 +231,7 @@ def _colours(attributes: Any, count: int) -> NDArray[np.float32] | None:
 
 
 class _Corners:
-    """The arrays of an OBJ file that the face corners of all shapes index."""
+    """The vertex arrays of an OBJ file, to which the indices of the face corners refer."""
 
     def __init__(
         self,

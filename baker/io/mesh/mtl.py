@@ -163,7 +163,7 @@ def _material(
         if values[:1] and values[0].lower() in ("xyz", "spectral"):
             raise InputError(f"{key} is given as {values[0]}; only R G B is read", file=file, object=name)
         numbers = [_number(v, key, file, name) for v in values[:3]] or [default]
-        numbers += numbers[:1] * (3 - len(numbers))  # G and B default to R
+        numbers += numbers[:1] * (3 - len(numbers))  # missing G and B are equal to R
         return (numbers[0], numbers[1], numbers[2])
 
     red, green, blue = colour("kd", 0.8)
@@ -186,7 +186,10 @@ def _material(
 
 
 def _map_options(words: list[str], file: str, material: str) -> tuple[list[str], NDArray[np.float64], bool]:
-    """Return a map statement's possible file names, (2, 3) matrix image uv from mesh uv, and `-clamp`."""
+    """Return the possible file names of a map statement, its uv transform, and whether `-clamp` is on.
+
+    The transform is a (2, 3) matrix that maps mesh uv to image uv.
+    """
     shift, stretch, clamp = [0.0, 0.0], [1.0, 1.0], False
     k = 0
     while k < len(words) - 1 and words[k].lower() in (*_OPTION_VALUES, *_VECTOR_OPTIONS):
@@ -209,7 +212,8 @@ def _map_options(words: list[str], file: str, material: str) -> tuple[list[str],
         [[stretch[0], 0.0, shift[0]], [0.0, stretch[1], 1.0 - stretch[1] - shift[1]]], np.float64
     )
     rest = words[k:]
-    # Names may contain blanks. Also try the bare file name, for absolute paths of another computer.
+    # Names may contain blanks. Also try the name without its folder, because absolute paths may be those of
+    # another computer.
     name = " ".join(rest)
     return list(dict.fromkeys((name, name.replace("\\", "/").rsplit("/", 1)[-1]))), transform, clamp
 
