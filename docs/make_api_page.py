@@ -35,7 +35,7 @@ baker.verify("out").channels["irradiance"].figures["median"]
 ```
 
 Pass settings as keywords, as an object of the class that the signature names, or as both. A keyword replaces
-the value in the object. The values are validated when the object is made. All errors are subclasses of
+the value in the object. Values are validated when the settings object is made. All errors are subclasses of
 `BakerError`. Results have a one-line `repr`, a table with a small picture in notebooks, and `to_dict()`,
 which returns plain values for JSON. Results can be pickled. Two results are equal only if they are the same
 object.

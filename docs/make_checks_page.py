@@ -24,9 +24,9 @@ NAMES = {
 HEAD = """\
 # Checks
 
-`baker check SCENE...` lints a scene before it is baked. It takes files, folders and patterns, traces only
-a few hundred shadow rays, and writes no file unless `--fix` or `--repair` is given. The program
-`docs/make_checks_page.py` generates this page from the code.
+`baker check SCENE...` lints scenes before they are baked. It takes files, folders and patterns. It writes no
+scene file unless `--fix` or `--repair` is given. `docs/make_checks_page.py` generates this page from the
+code.
 
 ```sh
 baker check level.glb                            # errors and warnings; -v adds infos and face numbers
@@ -37,19 +37,31 @@ baker check level.glb --json                     # {"passed", "findings": [...],
 baker check level.glb --sarif check.sarif --junit check.xml
 ```
 
-Exit code 0: no finding reaches the severity of `--fail-on` (default `error`). 1: a finding reaches it. 2:
-wrong use. 3: a file cannot be read; all other files are still checked. If a file can be read but a bake
-would refuse it (an index out of range, no usable triangle, a negative light), `check` reports a finding.
+| exit code | meaning |
+|---|---|
+| 0 | no finding reaches the severity of `--fail-on` (default `error`) |
+| 1 | a finding reaches it |
+| 2 | wrong use |
+| 3 | a file cannot be read; all other files are still checked |
 
-Every finding has `code`, `severity`, `object`, `node` (glTF node index; if several nodes show the mesh, the
-first of them), `count`, `message` and `fix`. If they apply, a finding also has `percent`, `primitive`, up to
-ten `faces` (numbers within the primitive) or `pairs` of faces, and one `position` in world space.
-Severities: an *error* makes the bake of the object useless or impossible, a *warning* is a visible fault or
-missing data in the result, and an *info* needs no action.
+If a file can be read but a bake would refuse it (an index out of range, no usable triangle, a negative
+light), `check` reports a finding.
+
+
+Every finding has `code`, `severity`, `object`, `node`, `count`, `message` and `fix`. `node` is the index of
+the glTF node; if several nodes show the mesh, it is the first of them. A finding may also have `percent`,
+`primitive`, up to ten `faces` (indices within the primitive) or `pairs` of faces, and one `position` in world
+space. There are three severities:
+
+- *error*: the bake of the object is useless or impossible.
+- *warning*: the result has a visible fault or lacks data.
+- *info*: no action is needed.
+
 
 ## Settings of a check
 
-In the file of `--config`, which may also contain the settings of a bake:
+In the file given with `--config`, the table `[check]` has the settings of checks. The file may also contain
+the settings of a bake:
 
 ```toml
 [check]
@@ -59,10 +71,16 @@ mip = 3                  # padding must separate charts down to this mip level
 rates = "out/level"      # estimate times from the measured speed of this bake
 ```
 
-In the scene itself, as glTF `extras`. On the document: `{"baker": {"check": {"fail_on": "warning", "ignore":
-["no-light"]}}}`. On a node: `{"baker": {"check": {"ignore": ["open-edges"]}}}`, or `"ignore": true` for
-all of its findings. The command line overrides the file, and the file overrides the scene; the `ignore` lists
-are merged.
+A scene may contain settings as glTF `extras`:
+
+| `extras` of | content |
+|---|---|
+| the document | `{"baker": {"check": {"fail_on": "warning", "ignore": ["no-light"]}}}` |
+| a node | `{"baker": {"check": {"ignore": ["open-edges"]}}}`; `"ignore": true` ignores all findings |
+
+The command line overrides the configuration file, and that file overrides the scene. The `ignore` lists of
+all three are merged.
+
 
 ## On every commit
 
@@ -79,14 +97,16 @@ repos:
 
 ## In a bake
 
-`baker bake` reports objects that it leaves out or unwraps again in the `warnings` of `bake.json`, under the
-same codes, and runs the checks marked *in a bake* below.
+`baker bake` runs the checks that are marked *in a bake* below. It also reports objects that it leaves out or
+unwraps again. These findings are in the `warnings` of `bake.json`, with the same codes.
+
 
 ## How long it takes
 
-Measured on two cores with `benchmarks/check_speed.py`, including the start of the program: a mesh of a
-million triangles with lightmap UVs at 2048 takes 10.3 s, and a hundred small kit pieces in one process take
-5.7 s.
+A mesh of a million triangles with lightmap UVs takes 10.3 s at `--resolution 2048`. A hundred small kit
+pieces, checked by one process, take 5.7 s. Both times were measured on two cores with
+`benchmarks/check_speed.py` and include the start of the program.
+
 
 ## All codes
 

@@ -42,7 +42,7 @@ SECTIONS: list[tuple[type[Settings], str, str]] = [
         RepairSettings,
         "repair",
         "Settings of `baker check` with `--fix` or `--repair`, and of `baker.repair`. On the command line,"
-        " settings that are also settings of a bake have the value given for the bake.",
+        " a setting of this table that is also a setting of a bake is set by the flag of the bake.",
     ),
     (VerifySettings, "verify", "Settings of `baker verify` and `baker.verify`."),
     (DiffSettings, "diff", "Settings of `baker diff` and `baker.diff`."),
@@ -62,8 +62,8 @@ TABLE = """
 TAIL = """
 ## The configuration file
 
-Keys of a bake are at the top level or in a table `[bake]`. Keys of another command are in a table with the
-name of its section above. Dashes in keys are treated as underscores:
+Settings of a bake are at the top level of the file or in a table `[bake]`. Settings of another command are in
+a table with the name of its section above. Keys may have dashes instead of underscores:
 
 ```toml
 resolution = 2048
