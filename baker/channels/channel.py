@@ -13,21 +13,24 @@ from baker.core.lightmap import ChannelDescription, Lightmap
 from baker.core.registry import Registry
 
 if TYPE_CHECKING:
-    # Do not import these at run time, because the registry is also read by code that needs no kernels.
+    # Do not import these modules at run time, because code that needs no kernels also reads the registry.
     from baker.radiosity.direct import DirectLight
     from baker.radiosity.final_gather import Gathered
 
 
 @dataclass(frozen=True)
 class Transport:
-    """Results of light transport for the n_front front texels. A result that no channel needs is None.
+    """Results of light transport for the n_front front texels, which are stored in the pages.
+
+    A result that no channel needs is None.
+
 
     Attributes
     ----------
     direct : DirectLight or None
         Direct light of all texel entries; the first n_front entries are the front texels.
     gathered : Gathered or None
-        Light that the final gather found.
+        Results of the final gather.
     ambient_occlusion : (n_front,) float32 or None
         Cosine-weighted share of the hemisphere without a hit within the AO distance; 1 is unoccluded.
     ao_samples : int
@@ -52,8 +55,8 @@ class Layer:
     value : (n_front, C) float32
         The C components of the channel at each front texel.
     error : (n_front, G), (n_front, 1) or (n_front,) float32
-        Standard error of the mean of the components in each of the channel's G groups (`Channel.groups`). One
-        column, or one axis, is the error of every group.
+        Standard error of the mean of the components in each of the channel's G groups (`Channel.groups`).
+        With shape (n_front, 1) or (n_front,), all groups have the same error.
     bound : bool
         Whether `error` is an upper bound, which may be several times the true error.
     kept : (n_front,) bool or None
@@ -89,7 +92,7 @@ class Channel(ChannelDescription):
     layers: Callable[[Transport], tuple[Layer, ...]]
 
     def __post_init__(self) -> None:
-        """Raise ValueError if `lower` contradicts `signed`."""
+        """Raise ValueError unless `signed` is true exactly if `lower` is negative."""
         if self.signed != (self.lower < 0.0):
             raise ValueError("a channel is signed if and only if its lower bound is negative")
 

@@ -205,11 +205,12 @@ def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-un
     """Write the probability of each cluster for points, which are represented by their bounding sphere.
 
         weight = power / max(distance^2, (sum of both radii)^2) * max(cos(angle), 0.05)
-        `distance` is between the centres of the cluster and of the bounding sphere. `angle` is a lower bound
-        of the angle between a normal of the cluster and a direction from the cluster to the bounding sphere.
-        If it is 90 degrees or more, the weight is 0, because no point sees an emitting side. The probability
-        of a cluster of positive weight is 0.95 weight / (sum of weights) + 0.05 / (number of clusters of
-        positive weight).
+
+    `distance` is between the centres of the cluster and of the bounding sphere. `angle` is a lower bound of
+    the angle between a normal of the cluster and a direction from the cluster to the bounding sphere. If it
+    is 90 degrees or more, the weight is 0, because no point sees an emitting side. The probability of a
+    cluster of positive weight is 0.95 weight / (sum of weights) + 0.05 / (number of clusters of positive
+    weight).
 
     emitters : Emitters; origin : (m, w, 3) float32, metres, points
     chance, cumulative : (C,) float32 output, see `TileEmitters`
@@ -258,8 +259,8 @@ def choose_emitter(row, first, chance, cumulative, u):  # type: ignore[no-untype
     """Choose an emitter with the uniform number u.
 
     row (M, 24), first (C + 1,) : see `Emitters`; chance, cumulative : (C,) float32, see `TileEmitters`
-    Returns the emitter, the probability density per m2 of each point on it, and a new uniform number in [0,
-    1) computed from u.
+    Returns the emitter, the probability density per m2 of each point on it, and a new uniform number,
+    computed from u, in the interval [0, 1).
     """
     # Choose a cluster.
     n = len(cumulative)

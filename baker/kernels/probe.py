@@ -22,8 +22,8 @@ BLACK_BACK, SOLID_BACK, SOLID_FRONT = 1, 2, 3
 # the ray may have passed through an edge.
 PROOF = 2
 # Factor of n_elsewhere in `hits` = n_inside + ELSEWHERE * n_elsewhere. n_inside is the number of rays that
-# hit a solid
-# from inside. n_elsewhere is the number of rays that hit neither a solid from inside nor a black back.
+# hit a solid from inside. n_elsewhere is the number of rays that hit neither a solid from inside nor a black
+# back.
 ELSEWHERE = 16
 
 

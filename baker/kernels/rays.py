@@ -2,10 +2,8 @@
 """Hemisphere rays of sixteen texels at a time, in loops that the compiler vectorises.
 
 `frame` stores the tangent frame at one point of each texel. For each sample, two Sobol numbers are scrambled,
-mapped
-to the hemisphere about +z, and rotated into the frame. All rows of `frame` are at constant offsets in one
-array, so
-that the compiler can prove that they do not overlap.
+mapped to the hemisphere about +z, and rotated into the frame. All rows of `frame` are at constant offsets in
+one array, so that the compiler can prove that they do not overlap.
 """
 
 from __future__ import annotations

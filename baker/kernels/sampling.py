@@ -2,10 +2,8 @@
 
 The points are the first two Sobol dimensions (a (0,2)-sequence) with nested uniform (Owen) scrambling. The
 leading bits (`shared_bits_mask`) are scrambled in the same way for all texels, the other bits differently for
-each
-texel. So the rays of sample s have similar directions in all texels, and ray packets stay coherent. The
-points
-of one texel are still a fully scrambled net.
+each texel. So the rays of sample s have similar directions in all texels, and ray packets stay coherent. The
+points of one texel are still a fully scrambled net.
 
 Based on: Sobol, 1967; Owen, Randomly permuted (t,m,s)-nets, 1995; Laine and Karras, Stratified
 sampling for stochastic transparency, 2011 (the hash); Burley, Practical hash-based Owen scrambling,

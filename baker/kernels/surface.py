@@ -2,10 +2,9 @@
 """The sample points of texels, from which rays start.
 
 Each texel has 16 points. They are uniformly distributed in the part of the texel's square that triangles
-cover, and
-stratified by a scrambled (0,2)-net. On low-poly curved surfaces, points are moved to the smooth surface that
-the shading normals imply (Hanika 2021). Otherwise facets would block each other's rays at the shadow
-terminator.
+cover, and stratified by a scrambled (0,2)-net. On low-poly curved surfaces, points are moved to the smooth
+surface that the shading normals imply (Hanika 2021). Otherwise facets would block each other's rays at the
+shadow terminator.
 
 Based on: Hanika, Hacking the shadow terminator, Ray Tracing Gems II, 2021; Waechter and Binder, A
 fast and robust method for avoiding self-intersection, Ray Tracing Gems, 2019.
@@ -34,8 +33,7 @@ N_POINTS = 16
 # each, and faces that are meant to be coplanar may be a few spacings apart.
 OFFSET, ROUNDING = 1.0e-5, 1.9e-6
 # Distance by which points near the border of their triangle are moved towards its centroid, as a multiple of
-# the
-# offset. The distance is at most half of the distance to the centroid.
+# the offset. The distance is at most half of the distance to the centroid.
 INWARD = 2.0
 # Smallest barycentric coordinate of a point. Below it, the point is near the border.
 BORDER = 0.01

@@ -52,8 +52,7 @@ class TriangleLookup(NamedTuple):
 
 
 # The functions below take the fields of `TriangleLookup` as separate arguments. Passing the tuple costs an
-# atomic
-# reference count for each array and call, which tripled the time per hit.
+# atomic reference count for each array and call, which tripled the time per hit.
 @inner
 def front_facing(row, prim, dx, dy, dz):
     """Return whether a ray of direction (dx, dy, dz) hits the front of triangle `prim`.

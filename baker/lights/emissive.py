@@ -1,13 +1,12 @@
 """Builds the table of emitters: emissive triangles with their power, in clusters of neighbours.
 
     power = pi area L
-    L is the luminance of the radiance. For a part of a textured triangle, L is the mean of R, G and B. The
-    power of a
-    two-sided triangle is twice as large. Textured triangles are cut into parts (`lights.emissive_texture`),
-    and each part
-    is an emitter. If the texture is constant in a part, the part has its exact mean radiance instead of the
-    texture. So
-    has a part with too much detail that cannot be cut further, because the number of parts is limited.
+
+L is the luminance of the radiance. For a part of a textured triangle, L is the mean of R, G and B. The power
+of a two-sided triangle is twice as large. Textured triangles are cut into parts (`lights.emissive_texture`),
+and each part is an emitter. If the texture is constant in a part, the part has its exact mean radiance
+instead of the texture. So has a part with too much detail that cannot be cut further, because the number of
+parts is limited.
 
 Based on: see `kernels.emitters`.
 """
@@ -48,15 +47,12 @@ MOST_PARTS = 32768
 # weight 1.
 _CROWD = 64.0
 # Limits of variance / mean^2 of the radiance in a part. Up to _CONSTANT (relative standard deviation 0.001),
-# the
-# radiance is treated as uniform. Above _SPARSE, the part has its mean radiance, because most texture samples
-# would be
-# black, and no more parts were available to divide it.
+# the radiance is treated as uniform. Above _SPARSE, the part has its mean radiance, because most texture
+# samples would be black, and no more parts were available to divide it.
 _CONSTANT, _SPARSE = 1.0e-6, 1.0
 # Longest edge of a part, as a share of the scene's diagonal. Up to it, a part that is also at most one texel
-# of the
-# texture wide has its mean radiance: the difference is visible only from small distances, and the mean has no
-# noise.
+# of the texture wide has its mean radiance: the difference is visible only from small distances, and the mean
+# has no noise.
 _SMALL = 1.0 / 128.0
 
 

@@ -1,10 +1,8 @@
 """Textured emission: divides triangles into parts of low variance, with exact mean radiance.
 
 A triangle is cut at the midpoints of its edges into four parts. The parts that cause most noise are cut
-again. Black
-parts are dropped. Uniformly distributed points of the remaining parts are then samples of low variance. The
-noise of
-a triangle is
+again. Black parts are dropped. Uniformly distributed points of the remaining parts are then samples of low
+variance. The noise of a triangle is
 
     noise = sum share (E[L^2] / E[L]^2 - 1)
 
@@ -31,26 +29,21 @@ from baker.lights.uv_integral import uv_means
 # Noise of a triangle, as the module defines it. Up to it, the triangle is not cut further.
 ENOUGH = 0.05
 # Edge length of a part, as a share of its triangle's edge. A part this small is not cut further, because
-# float32
-# barycentrics would not distinguish smaller parts.
+# float32 barycentrics would not distinguish smaller parts.
 _SMALLEST = 2.0**-14
 # Gain (noise times weight) of a part, as a share of the largest gain. Parts above it are cut in the same
 # round.
 _TOGETHER = 0.125
 # MOST_CROSSED: total number of texel lines (borders between two rows or columns of texels) that the edges of
-# all parts
-# may cross, which limits the time to about a second. To stay below it, means of parts are computed from a
-# smaller
-# version of their texture. FEW_CROSSED: number of texel lines that the edges of one part cross. Up to it, the
-# part
-# always uses the full resolution.
+# all parts may cross, which limits the time to about a second. To stay below it, means of parts are computed
+# from a smaller version of their texture. FEW_CROSSED: number of texel lines that the edges of one part
+# cross. Up to it, the part always uses the full resolution.
 MOST_CROSSED, FEW_CROSSED = 4.0e6, 64.0
 # Share of the remaining number of texel lines that each round of cutting may cross, even if many rounds
 # follow.
 _ROUND = 0.25
 # Number of texel lines that the parts of one call of the kernel cross. Signals such as Ctrl-C are handled
-# between
-# calls.
+# between calls.
 _CALL = 2.5e5
 
 

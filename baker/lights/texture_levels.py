@@ -1,12 +1,9 @@
 """Emissive textures at lower resolutions, for triangles whose edges cross too many texel lines.
 
 A texel line is a border between two rows or columns of texels. Each texel of a smaller texture contains the
-mean RGB of
-the original texture over its area, and, in the fourth column, the variance of the original texture inside
-this
-area. Width and height are halved independently. So a long narrow triangle that crosses many repeats of the
-texture
-loses resolution only along its length.
+mean RGB of the original texture over its area, and, in the fourth column, the variance of the original
+texture inside this area. Width and height are halved independently. So a long narrow triangle that crosses
+many repeats of the texture loses resolution only along its length.
 
 Based on: Heckbert, Survey of texture mapping, 1986 (box-filtered levels).
 """
@@ -23,8 +20,7 @@ from baker.lights.uv_integral import BLOCK, N_SUMS, RowSums, fill_row_sums
 
 _CLAMP = 2
 # Width or height of a mip level, texels. Above it, the next coarser level is used instead, if width and
-# height are
-# even. (If one is odd, the next level omits the last row or column and has different means.)
+# height are even. (If one is odd, the next level omits the last row or column and has different means.)
 LARGEST_SIDE = 2048
 # Largest number of rows or columns that are averaged in one step, which limits the working memory.
 _STRIP = 256

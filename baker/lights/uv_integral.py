@@ -27,12 +27,10 @@ BLOCK = 32
 # Number of columns of f: red, green, blue, and the weighted sum of their squares.
 N_SUMS = 4
 # area / (longest edge)^2 of a triangle. Up to it, the triangle is treated as degenerate: it is integrated
-# along its
-# longest edge.
+# along its longest edge.
 _THIN = 1.0e-9
 # Largest side of a triangle's uv bounding box, texels. Up to it, the spread of a bilinear texture is
-# estimated from
-# sixteen points.
+# estimated from sixteen points.
 _FEW_CELLS = 3.0
 # integral / (sum of the magnitudes of its terms). Up to it, an integral is treated as rounding error and set
 # to 0.

@@ -4,13 +4,11 @@
 The eye is a camera or a surface point. Each sample traces a subpath from a light and stores its vertices,
 then traces a subpath from the eye. Every eye vertex is connected to a sampled light and to all stored
 vertices. If the eye is a camera, the vertices of light subpaths are connected to its pinhole as well. The
-light of a
-connection to the pinhole is a *splat*: it is added to the pixel in which the vertex is visible.
+light of a connection to the pinhole is a *splat*: it is added to the pixel in which the vertex is visible.
 `bidirectional_weights` computes MIS weights.
 
 A light subpath has at most `MAX_LIGHT_VERTICES` vertices, and the MIS weights include only techniques within
-this
-limit. Eye subpaths end by Russian roulette.
+this limit. Eye subpaths end by Russian roulette.
 
 Based on: Lafortune and Willems, Bi-directional path tracing, 1993; Veach and Guibas, Bidirectional estimators
 for light transport, 1994; Dutre, Lafortune and Willems, Monte Carlo light tracing with direct computation of

@@ -310,7 +310,7 @@ def aim_both_ways(path, row, lane, lights, sphere, choice, u, w, value, ray):
 def emitter_cosine(emitter, e, dx, dy, dz):
     """Return the cosine at emitter e of a ray that arrives in unit direction d; negative on a dark side.
 
-    emitter : (E, 24) float64, see `emitters`
+    emitter : (E, 24) float64, see `pathtracer.emitters`
     """
     cosine = -(
         dx * emitter[e, EMITTER_NORMAL]
@@ -324,7 +324,7 @@ def emitter_cosine(emitter, e, dx, dy, dz):
 def emission_density(emitter, e):
     """Return the density, per projected solid angle, of a light subpath's directions from emitter e.
 
-    emitter : (E, 24) float64, see `emitters`
+    emitter : (E, 24) float64, see `pathtracer.emitters`
     """
     return INV_PI * (0.5 if emitter[e, EMITTER_TWO_SIDED] > 0.0 else 1.0)
 
@@ -336,7 +336,7 @@ def meet_emitter(path, lane, surface, prim, emitter, e, seen, value):
     The caller multiplies `value` by the emission texture.
 
     path : (N_ROWS_BOTH, n) float64; surface : (T, 32) float32, see `Surfaces`
-    emitter : (E, 24) float64, see `emitters`
+    emitter : (E, 24) float64, see `pathtracer.emitters`
     e : number of the emitter that was hit, -1 if no light subpath starts there
     seen : whether the ray comes from the camera directly. No other technique samples such paths, so the
         weight is 1

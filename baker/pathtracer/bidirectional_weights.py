@@ -7,18 +7,14 @@ the light and k - s from the eye. Its density is p_s, and its weight by the bala
     p_s+1 / p_s = pL(x_s) / pE(x_s)        w_s = 1 / (1 + sum over s' != s of p_s' / p_s)
 
 pL and pE are the densities, per area, of a vertex sampled from the light side and from the eye side. The sum
-is
-split at s: the part s' < s is stored with the light subpath, the part s' > s with the eye subpath. Each
+is split at s: the part s' < s is stored with the light subpath, the part s' > s with the eye subpath. Each
 part is updated while its subpath grows, so that the cost of a connection does not depend on the subpaths'
 lengths.
 
 A light subpath stores one sum, because all techniques with fewer light vertices exist. Techniques with more
-light
-vertices exist only up to `MAX_LIGHT_VERTICES`. Therefore an eye subpath stores one sum for each number of
-vertices
-that a light subpath may still add. The density of a mirror reflection is set to 1, because it cancels in the
-ratio.
-Connections at mirrors have weight 0.
+light vertices exist only up to `MAX_LIGHT_VERTICES`. Therefore an eye subpath stores one sum for each number
+of vertices that a light subpath may still add. The density of a mirror reflection is set to 1, because it
+cancels in the ratio. Connections at mirrors have weight 0.
 
 Based on: Veach, Robust Monte Carlo methods for light transport simulation, 1997, ch. 5.3 (shading normals), 8
 and 10; van Antwerpen, Unbiased physically based rendering on the GPU, 2011 (recursive sums); Georgiev,

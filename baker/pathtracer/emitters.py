@@ -1,12 +1,10 @@
 """The emissive triangles of a scene, for the path tracer.
 
 This module does not use `lights.emissive.build_emitters`. So an emitter that the bake misses by a mistake
-there is
-still in the reference. From the resolved materials, this module computes which triangles emit, and their
-area,
-radiance, sides and power. `lights.emissive_texture.cut` divides triangles with an emissive texture into
-parts. The
-parts affect sampling densities only, because the radiance of a point is looked up in the material.
+there is still in the reference. From the resolved materials, this module computes which triangles emit, and
+their area, radiance, sides and power. `lights.emissive_texture.cut` divides triangles with an emissive
+texture into parts. The parts affect sampling densities only, because the radiance of a point is looked up in
+the material.
 
     power = pi area L, twice that if two-sided
 
@@ -41,12 +39,10 @@ EMITTER_CORNER, EMITTER_NORMAL, EMITTER_AREA, EMITTER_TWO_SIDED, EMITTER_CHANCE 
 EMITTER_RADIANCE, EMITTER_TEXTURED, EMITTER_PART = 15, 18, 19
 EMITTER_COLUMNS = 24
 # Largest number of parts of all textured triangles, minus the number of textured triangles. Four times the
-# number of
-# bakes.
+# number of bakes.
 MAX_PARTS = 131072
 # Longest edge of a part, as a share of the scene's diagonal. Parts up to this size that are at most one texel
-# of the
-# texture wide are not cut further.
+# of the texture wide are not cut further.
 _SMALL = 1.0 / 128.0
 # Number of cells minus one, along the longest axis of the grid of `_spatial_order`.
 _CELLS = 1023.0

@@ -1,10 +1,9 @@
 """Estimators of the rendering equation by name, with their ways to sample directions and lights.
 
-With `uniform`, `cosine`, `stratified` and `bsdf`, paths hit emitters and the sky at random. `light` samples
-a light at every vertex. `mis` and `mis-power` combine both techniques by multiple importance sampling. `bdpt`
+With `uniform`, `cosine`, `stratified` and `bsdf`, paths hit emitters and the sky at random. `light` samples a
+light at every vertex. `mis` and `mis-power` combine both techniques by multiple importance sampling. `bdpt`
 connects paths from the eye with paths from lights (`bidirectional`). Paths cannot hit lights without area, so
-every
-estimator samples these lights or starts paths at them.
+every estimator samples these lights or starts paths at them.
 
 Based on: Kajiya, The rendering equation, 1986; Veach, Robust Monte Carlo methods for light transport
 simulation, 1997, ch. 8 and 9.

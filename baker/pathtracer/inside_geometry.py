@@ -1,7 +1,7 @@
-"""Find points inside geometry, by the same rule as the bake but with different rays.
+"""Finds points inside geometry, by the same rule as the bake but with different rays.
 
-A point is inside geometry if at least `PROOF` of its rays hit a solid from inside. It is also inside if every
-ray hits either a solid from inside or a black back.
+A point is inside geometry if at least `kernels.probe.PROOF` of its rays hit a solid from inside. It is also
+inside if each of its rays hits either a solid from inside or a black back, the back of a one-sided surface.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ RAYS = 8
 
 
 class Views(NamedTuple):
-    """What the rays from n points hit.
+    """For each of n points, how many rays hit a solid from inside, and how many hit a black back.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ def is_inside_geometry(views: Views) -> NDArray[np.bool_]:
     Parameters
     ----------
     views : Views
-        What the rays from the points hit.
+        Counts of the points, from `look_around`.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def cast_around(
     """
     inside, black = np.zeros(len(origin), np.int64), np.zeros(len(origin), np.int64)
     for _ in range(rays):
-        # The normal plus a random unit vector, normalized, is cosine-weighted.
+        # The sum of the normal and a random unit vector has a cosine-weighted direction.
         ball = random.standard_normal((len(origin), 3))
         direction = normal + ball / np.linalg.norm(ball, axis=1, keepdims=True)
         direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-9)

@@ -2,9 +2,9 @@
 
     E  = pi mean(L)                        AO = share of cosine-weighted rays without a hit
 
-Each sample L estimates the radiance of a white Lambertian surface at the point.
-A pass is a fixed number of samples at every point. The samples of a pass may be stratified, but passes are
-independent. So the standard error of the mean over passes follows from the variance between passes.
+Each sample L estimates the radiance of a white Lambertian surface at the point. A pass is a fixed number of
+samples at every point. The samples of one pass may be stratified, but different passes are independent. So
+the variance between passes gives the standard error of their mean.
 """
 
 from __future__ import annotations
@@ -43,17 +43,18 @@ def irradiance_pass(
     chosen: NDArray[np.int64] | None = None,
     progress: Progress = silent,
 ) -> None:
-    """Add one pass of path-traced irradiance, lx, to an estimate.
+    """Add one pass of path tracing to an estimate of the irradiance, lx, of n points.
 
     Parameters
     ----------
     reference : Reference
         The scene.
     estimate : PointEstimate
-        Estimate of n points, 3 channels; changed in place. The number of the pass is `estimate.rounds`.
+        Estimate for n points, R, G and B; changed in place. The number of the pass is `estimate.rounds`.
     position : (n, k, 3) float64
-        For each point, k positions, metres, relative to the geometry's origin, for example points in the
-        area of a texel. Sample s of pass p, with S samples per pass, starts at position (p S + s) modulo k.
+        For each point, k positions, for example points in the area of a texel; metres, relative to
+        `reference.geometry.origin`. With S samples per pass, sample s of pass p starts at position (p S + s)
+        modulo k.
     normal : (n, k, 3) float64
         Shading normals at the positions, unit, world.
     face_normal : (n, k, 3) float64
@@ -108,14 +109,15 @@ def ambient_occlusion_pass(
     seed: int = 0,
     progress: Progress = silent,
 ) -> None:
-    """Add one pass of ambient occlusion, 0 to 1 (1: no ray has a hit), to an estimate.
+    """Add one pass of rays to an estimate of the ambient occlusion, 0 to 1, of n points.
 
     Parameters
     ----------
     reference : Reference
         The scene.
     estimate : PointEstimate
-        Estimate of n points, 1 channel; changed in place. The number of the pass is `estimate.rounds`.
+        Estimate for n points, 1 channel (1: no ray has a hit); changed in place. The number of the pass is
+        `estimate.rounds`.
     position : (n, k, 3) float64
         Positions of each point, see `irradiance_pass`.
     normal : (n, k, 3) float64
@@ -152,8 +154,8 @@ def ambient_occlusion_pass(
         )  # fmt: skip
         add_pass(estimate, rows, found / samples)
 
-    # If points are dense, use tiles of up to 4096 points, because more neighbours of a point are then in its
-    # tile. A tile of more than 512 points is at most 1/32 of all points, so that threads rarely wait for the
+    # If points are dense, use tiles of up to 4096 points, so that more neighbours of a point are in its tile.
+    # A tile of more than 512 points contains at most 1/32 of all points, so that threads rarely wait for the
     # last tile.
     tile = min(max(4 * _TILE, len(position) // 32), 32 * _TILE) if dense else 4 * _TILE
     run_tiles(

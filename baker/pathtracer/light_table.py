@@ -1,13 +1,14 @@
-"""The table of all lights that paths sample: emitters, lights without area, the sky.
+"""The table of all lights that paths sample: emitters, lights without area, and the sky.
 
 Each light is chosen with a fixed probability. Half of the total probability is distributed in proportion to
-power. The other half is divided equally among groups: all emitters, each light without area, the sky. So weak
-lights get enough samples beside a strong one such as the sun. Each estimate is divided by the probability of
-its light, so that its expectation does not depend on the probabilities.
+power. The other half is divided equally among groups. All emitters together are one group, each light without
+area is a group, and the sky is one. So weak lights get enough samples beside a strong light such as the sun.
+Each estimate is divided by the probability of its light, so that its expectation does not depend on the
+probabilities.
 
 The modules of `baker.lights.kinds` describe lights without area as `EmissionProfile`s. Kernels distinguish
-four forms of profile: even, cone, parallel and tabulated. A profile that has none of the first three forms is
-a table of fall-off values, which the kernels interpolate. So new kinds of light need no change in this file.
+four forms of profile: even, cone, parallel and tabulated. A tabulated profile is a table of fall-off values,
+which the kernels interpolate. It can express any fall-off, so new kinds of light need no change in this file.
 
 Based on: Shirley, Wang and Zimmerman, Monte Carlo techniques for direct lighting calculations, 1996;
 KHR_lights_punctual.
@@ -43,13 +44,12 @@ from baker.trace.jit import inner
 
 _LUMINANCE = np.array(LUMINANCE_WEIGHTS)
 # Columns of a light without area, from its `EmissionProfile`:
-#
-#     DELTA_FORM            form of the profile, see below
+#  DELTA_FORM            form of the profile: EVEN, CONE, PARALLEL or TABULATED
 #     DELTA_POSITION        metres, relative to the geometry's origin; 0 for parallel light (3)
 #     DELTA_AXIS            unit direction in which the light shines (3)
 #     DELTA_INTENSITY       cd, or lx for parallel light (3)
 #     DELTA_MIN_COSINE      cosine of the largest angle to the axis
-#     DELTA_CONE_SCALE      cone_scale; 0 if None
+#  DELTA_CONE_SCALE      `EmissionProfile.cone_scale`; 0 if None
 #     DELTA_CHANCE          probability with which the light is chosen
 #     DELTA_INVERSE_RANGE   1 / range^2, 1/m2; 0 without a range
 #     DELTA_TANGENT         unit direction of azimuth 0, if tabulated (3)
@@ -80,19 +80,19 @@ EVEN, CONE, PARALLEL, TABULATED = 0.0, 1.0, 2.0, 3.0
 #     ROW_MIN_COSINE      DELTA_MIN_COSINE of a light without area
 #     ROW_CONE_SCALE      DELTA_CONE_SCALE of a light without area
 #     ROW_RADIANCE        radiance of an emitter without texture or of the sky; intensity of other lights (3)
-#     ROW_KIND            see below
+#  ROW_KIND              a constant KIND_EMITTER to KIND_TABULATED
 ROW_ORIGIN, ROW_EDGE, ROW_NORMAL, ROW_GAIN, ROW_TWO_SIDED = 0, 3, 9, 12, 13
 ROW_MIN_COSINE, ROW_CONE_SCALE, ROW_RADIANCE, ROW_KIND = 14, 15, 16, 19
 ROW_INVERSE_RANGE = ROW_TWO_SIDED
 ROW_COLUMNS = 20
-# Values of ROW_KIND. `vertex_simd` treats kinds below KIND_PARALLEL as lights at a finite distance. It
-# multiplies the gain of a tabulated light by its fall-off first, and then treats the light as KIND_EVEN.
+# Values of ROW_KIND. `vertex_simd` treats kinds below KIND_PARALLEL as lights at a finite distance. For a
+# tabulated light, it first multiplies ROW_GAIN by the fall-off, and then treats the light as KIND_EVEN.
 KIND_EMITTER, KIND_EVEN, KIND_CONE, KIND_PARALLEL, KIND_SKY, KIND_TABULATED = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
 _ROW_KIND = {EVEN: KIND_EVEN, CONE: KIND_CONE, PARALLEL: KIND_PARALLEL, TABULATED: KIND_TABULATED}
 # Columns of the sky: radiance, cd/m2 (3); probability with which it is chosen.
 SKY_RADIANCE, SKY_CHANCE = 0, 3
-# Length of rays to parallel light and to the sky, metres; length of rays to other lights, as a share of the
-# distance to the light.
+# FAR: length of rays to parallel light and to the sky, metres. SHORT: length of rays to other lights, as a
+# share of the distance to the light.
 FAR = 1.0e30
 SHORT = 0.9999
 
@@ -103,11 +103,11 @@ class LightTable(NamedTuple):
     Attributes
     ----------
     emitter : (E, 24) float64
-        Emitters. Columns: see `emitters`.
+        Emitters. Columns: EMITTER_CORNER to EMITTER_PART of `pathtracer.emitters`.
     delta : (P, 20) float64
         Lights without area. Columns: `DELTA_FORM` to `DELTA_AZIMUTHS`.
     triangle : (E,) int32
-        For each emitter, the triangle of the scene that it is, or is a part of.
+        Triangle of the scene that contains each emitter.
     code : (T,) int32
         For each triangle of the scene, the code of its emitters, see `FoundEmitters`.
     node : (K, 4) int32
@@ -186,7 +186,7 @@ def build_light_table(
 def _without_area(
     lights: tuple[PunctualLight, ...], disc: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float32]]:
-    """Return `delta` (P, 20), power (P,), lm, and `falloff` (N,) of lights without area.
+    """Return `LightTable.delta`, the powers (P,) in lm, and `LightTable.falloff` of lights without area.
 
     Black lights are left out. The column DELTA_CHANCE is still 0.
 
@@ -315,7 +315,7 @@ def pick_light(cumulative, u):  # type: ignore[no-untyped-def]
 def point_on_emitter(emitter, e, b0, b1, b2):  # type: ignore[no-untyped-def]
     """Return the point of emitter e at barycentrics (b0, b1, b2): three floats, metres.
 
-    emitter : (E, 24) float64, see `emitters`
+    emitter : (E, 24) float64, see `pathtracer.emitters`
     """
     return (
         b0 * emitter[e, EMITTER_CORNER]
@@ -334,10 +334,11 @@ def point_on_emitter(emitter, e, b0, b1, b2):  # type: ignore[no-untyped-def]
 def aim_at_emitter(emitter, e, u, w, x, y, z):  # type: ignore[no-untyped-def]
     """Sample a point uniformly on emitter e; return the vector d to it, its density and its barycentrics.
 
-    Returns dx, dy, dz in metres, from (x, y, z) to the point; density; b1, b2. The density is per steradian
-    and includes the emitter's probability. It is 0 if the side that faces (x, y, z) does not emit.
+    Returns dx, dy, dz, density, b1, b2. The vector d is in metres, from (x, y, z) to the point. The density
+    is per steradian and includes the emitter's probability. It is 0 if the side that faces (x, y, z) does not
+    emit.
 
-    emitter : (E, 24) float64, see `emitters`; u, w : random numbers in [0, 1)
+    emitter : (E, 24) float64, see `pathtracer.emitters`; u, w : random numbers in [0, 1)
     """
     b1, b2 = triangle_barycentric(np.float32(u), np.float32(w))
     px, py, pz = point_on_emitter(emitter, e, 1.0 - b1 - b2, b1, b2)
@@ -350,7 +351,7 @@ def aim_at_emitter(emitter, e, u, w, x, y, z):  # type: ignore[no-untyped-def]
 def on_whole_triangle(emitter, e, b1, b2):  # type: ignore[no-untyped-def]
     """Convert barycentrics (b1, b2) of emitter e to barycentrics of the scene's triangle that contains it.
 
-    emitter : (E, 24) float64, see `emitters`
+    emitter : (E, 24) float64, see `pathtracer.emitters`
     """
     size = emitter[e, EMITTER_PART + 2]
     return emitter[e, EMITTER_PART] + size * b1, emitter[e, EMITTER_PART + 1] + size * b2
@@ -358,12 +359,12 @@ def on_whole_triangle(emitter, e, b1, b2):  # type: ignore[no-untyped-def]
 
 @inner
 def emitter_density(emitter, e, dx, dy, dz):  # type: ignore[no-untyped-def]
-    """Return the density per steradian with which light sampling finds the point of emitter e at vector d.
+    """Return the density per steradian with which light sampling chooses the point of emitter e at vector d.
 
     The density includes the emitter's probability. It is 0 if the side that faces the origin of d does not
     emit.
 
-    emitter : (E, 24) float64, see `emitters`; dx, dy, dz : metres, vector to the point
+    emitter : (E, 24) float64, see `pathtracer.emitters`; dx, dy, dz : metres, vector to the point
     """
     square = dx * dx + dy * dy + dz * dz
     if square <= 0.0:
@@ -383,10 +384,10 @@ def emitter_density(emitter, e, dx, dy, dz):  # type: ignore[no-untyped-def]
 
 @inner
 def aim_at_delta(lights, e, x, y, z):  # type: ignore[no-untyped-def]
-    """Return the unit direction to a light without area, the length of a ray to it, and its irradiance.
+    """Return the unit direction to a light without area, the length of a ray to it, and the irradiance.
 
-    Returns dx, dy, dz, length, irradiance. The ray starts at (x, y, z). Its length, metres, is slightly
-    shorter than the distance to the light. The irradiance is that of a surface at (x, y, z) that faces the
+    Returns dx, dy, dz, length, irradiance. The ray starts at (x, y, z), and its length, metres, is slightly
+    less than the distance to the light. The irradiance is that of a surface at (x, y, z) that faces the
     light, divided by the light's intensity.
 
     lights : `LightTable`; e : row of `LightTable.delta`
@@ -420,7 +421,8 @@ def range_window(square, inverse_range):  # type: ignore[no-untyped-def]
 def falloff(lights, e, cosine, dx, dy, dz):  # type: ignore[no-untyped-def]
     """Return the fall-off f of light e, which has a position, in a direction; see `EmissionProfile`.
 
-    lights : `LightTable`; dx, dy, dz : unit direction from the light; cosine : of its angle to the axis
+    lights : `LightTable`; dx, dy, dz : unit direction from the light
+    cosine : cosine of the angle between that direction and the light's axis
     """
     delta = lights.delta
     if delta[e, DELTA_FORM] == EVEN:
@@ -443,11 +445,12 @@ def tabulated(table, delta, e, cosine, dx, dy, dz):  # type: ignore[no-untyped-d
     rows, columns = np.int64(delta[e, DELTA_COSINES]), np.int64(delta[e, DELTA_AZIMUTHS])
     if cosine < low:
         return 0.0
-    # Row of the table, from the cosine to the axis.
+    # Compute the row of the table from the cosine.
     r = min(max((cosine - low) / max(1.0 - low, 1.0e-12), 0.0), 1.0) * (rows - 1)
     i = min(np.int64(r), rows - 2)
     r -= i
-    # Column of the table, from the azimuth, which increases from the tangent towards axis x tangent.
+    # Compute the column of the table from the azimuth, which increases from the tangent towards axis x
+    # tangent.
     start = np.int64(delta[e, DELTA_TABLE]) + i * columns
     j = next_j = np.int64(0)
     q = 0.0

@@ -1,9 +1,10 @@
 """Cosine-weighted occlusion rays from points of surfaces: the reference of ambient occlusion.
 
 A packet holds one ray from each of eight neighbouring points, all with the same sample number. The leading
-bits of their random numbers are the same for all points (`shared`), so that the rays of points close together
-are nearly parallel. Such a packet is traced with Embree's coherent flag, which is faster. Each loop over
-lanes accesses one array, so that the compiler vectorizes it (see `path_blocks`).
+bits of the random numbers of a sample are the same for all points (`kernels.sampling.shared_bits_mask`), so
+the eight rays are nearly parallel. If the points are also close together, the packet is traced with Embree's
+coherent flag, which is faster. Each loop over lanes accesses one array, so that the compiler vectorizes the
+loop (see `path_blocks`).
 
 Based on: Morton, A computer oriented geodetic data base and a new technique in file sequencing, 1966.
 """
@@ -37,17 +38,18 @@ _f = np.float32
 _w = np.uint32
 _ZERO, _ONE = _f(0.0), _f(1.0)
 _L = BLOCK_WIDTH
-# A packet is traced as coherent if the extent of its origins is at most `_ALIKE` times a length: the ray
-# length or, if that is smaller, `_FAR` times `Surfaces.min_offset_scale`, a tenth of the scene's diagonal.
+# A packet is traced as coherent if the extent of its origins is below `_ALIKE` times the smaller of two
+# lengths: the ray length, and `_FAR` times `Surfaces.min_offset_scale`, which is a tenth of the scene's
+# diagonal.
 _ALIKE, _FAR = _f(0.125), _f(100.0)
 # Approximate number of points that `are_dense` examines.
 _LOOK = 128
-# For each number of ten bits, the number with two zeros inserted between any two of its bits.
+# For each number of ten bits: the number with two zero bits inserted between neighbouring bits.
 _SPREAD = np.sum([(np.arange(1024) >> bit & 1) << 3 * bit for bit in range(10)], axis=0)
 
 
 def alike_within(max_distance: np.float32, min_offset_scale: np.float32) -> np.float32:
-    """Return the largest extent, metres, of the ray origins of a packet that is traced as coherent.
+    """Return the extent, metres, of a packet's ray origins below which the packet is traced as coherent.
 
     max_distance : metres, length of the rays; min_offset_scale : metres, see `Surfaces`
     """
@@ -55,9 +57,9 @@ def alike_within(max_distance: np.float32, min_offset_scale: np.float32) -> np.f
 
 
 def are_dense(position: NDArray[np.float64], alike: float) -> bool:
-    """Return whether most of the examined points (n, 3) are closer than `alike`, metres, to their successor.
+    """Return whether most of some points (n, 3) are closer than `alike`, metres, to the next point.
 
-    Sorting the points by `near_together` saves time only in that case.
+    About `_LOOK` points are examined. Sorting by `near_together` saves time only if the result is True.
     """
     first = np.arange(0, len(position) - 1, max(len(position) // _LOOK, 1))
     step = abs(position[first + 1] - position[first]).max(axis=1)
@@ -78,7 +80,7 @@ def near_together(position: NDArray[np.float64]) -> NDArray[np.int64]:
 def seed_lanes(words, name, group, number, salt):  # type: ignore[no-untyped-def]
     """Write the two scramble seeds of points `group` to `group` + 7, to rows CHOICE and LOBE.
 
-    words : block, uint32; name : (m,) int64, number, salt : see `open_rays`
+    words : block, uint32; name (m,) int64, number, salt : see `open_rays`
     """
     for lane in range(min(BLOCK_WIDTH, len(name) - group)):
         words[KEY * _L + lane] = name[group + lane]
@@ -139,10 +141,10 @@ def extent(s, lanes):  # type: ignore[no-untyped-def]
 
 @inner
 def point_lanes(s, max_distance):  # type: ignore[no-untyped-def]
-    """Write a cosine-weighted ray direction of length `max_distance` to each lane.
+    """Write a ray of cosine-weighted direction and length `max_distance` to each lane.
 
-    `ALIVE` becomes 0 if the direction points below the triangle, which `count_lanes` treats as occluded. It
-    becomes 1 for other directions.
+    `ALIVE` becomes 1, or 0 if the direction points below the triangle. `count_lanes` treats the ray as
+    occluded then.
 
     s : block, float32
     """
@@ -199,13 +201,13 @@ def open_rays(  # type: ignore[no-untyped-def]
     position, normal, face_normal : (m, k, 3) float64, k positions of each point with shading and geometric
         normals. Sample s of pass p starts at position (p n + s) modulo k. Tracing is fastest if consecutive
         points are close together
-    name : (m,) int64, numbers of the points, for their random numbers
+    name : (m,) int64, numbers of the points, on which their random numbers depend
     memory : `PathMemory`
-    arguments : (2, 5) int64, `arguments_of` incoherent and coherent packets
+    arguments : (2, 5) int64, `packets.arguments_of` incoherent packets, and of coherent packets
     sobol_points : (n, 2) uint32, bit-reversed Sobol points of the n samples of a pass
     shared : uint32, mask of the bits of bit-reversed random numbers that are the same for all points
     max_distance : float32, metres, length of the rays
-    alike : float32, metres, largest extent of a coherent packet's origins, see `alike_within`
+    alike : float32, metres, from `alike_within`
     sizes : (2,) float32, metres, `Surfaces.min_offset_scale` and `.default_size`
     number : number of the pass; salt : `seed_salt` of the seed; out : (m, 1) float64, output
     """

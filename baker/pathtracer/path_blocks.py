@@ -3,8 +3,8 @@
 A block is a ray packet of width 8, followed by further rows of eight numbers. A lane is one column of a block
 and holds one path. Rays are traced and shaded in place. All rows are at constant offsets in one array, for
 two reasons. The compiler vectorizes loops over lanes only if it can prove that rows do not overlap. It
-vectorizes loops of eight only if they access a single array. Lanes of ended paths are refilled with paths
-from the last blocks, so that packets stay full.
+vectorizes loops of only eight iterations if they access a single array. Lanes of ended paths are refilled
+with paths from the last blocks, so that packets stay full.
 
 Based on: Laine, Karras and Aila, Megakernels considered harmful, 2013 (many paths between rays); van
 Antwerpen, Improving SIMD efficiency for parallel Monte Carlo light transport on the GPU, 2011 (compaction).
@@ -42,7 +42,7 @@ _L = BLOCK_WIDTH
 # Rows after those of the packet. State of a path:
 #
 #     BETA      throughput (3)
-#     DENSITY   density, per steradian, of the ray's direction; 0 if emission at its hit gets no MIS weight
+#  DENSITY  density, per steradian, of the ray's direction; 0 if emission at its hit has the MIS weight 1
 #     COSINE    cosine of the ray's direction to the shading normal at its origin
 #     BOUNCES   number of reflections; -1 before the first hit of a camera ray
 #     POINT     row of the path's point in the tile's sums
@@ -62,13 +62,13 @@ CHOICE, LOBE = ROWS + 31, ROWS + 32
 # Ray to a light: unit direction (3), length in metres, contribution if nothing blocks it (3), barycentrics of
 # its end on an emitter.
 TO_LIGHT, MAX_DISTANCE, VALUE, B1, B2 = (ROWS + i for i in (33, 36, 37, 40, 41))
-# Copies of the hit triangle's columns in `Surfaces.row` up to TWO_SIDED (23), and of the chosen light's row
-# in `LightTable.row` (20).
+# Copies of the hit triangle's columns CORNER to TWO_SIDED in `Surfaces.row` (23), and of the chosen light's
+# row in `LightTable.row` (20).
 TRIANGLE, LIGHT_ROW = ROWS + 42, ROWS + 65
 N_ROWS = ROWS + 85
 BLOCK = N_ROWS * _L
-# Number of packets of pending shadow rays; rays to the same light share a packet. Rows after those of a ray:
-# contribution if nothing blocks the ray (3), `POINT` of its path.
+# BINS: number of packets of pending shadow rays; rays to the same light share a packet. Rows of such a packet
+# after the 12 rows of its rays: contribution if nothing blocks the ray (3), `POINT` of its path.
 BINS = 8
 BIN_VALUE, BIN_POINT, BIN_ROWS = 12, 15, 16
 
@@ -105,7 +105,7 @@ class PathMemory(NamedTuple):
 
 
 def new_path_memory(rays: RayScene) -> PathMemory:
-    """Return memory at multiples of 64 bytes, in which rays have time 0, tnear 0 and all mask bits set."""
+    """Return memory at multiples of 64 bytes. Rays in it have time 0, tnear 0 and all mask bits set."""
     on, s = aligned_floats(BLOCK_WIDTH).view(np.int32), aligned_floats(BLOCKS * BLOCK)
     bins = aligned_floats(BINS * BIN_ROWS * _L)
     s.view(np.uint32).reshape(BLOCKS, N_ROWS, BLOCK_WIDTH)[:, MASK] = NO_HIT
@@ -149,7 +149,7 @@ def colour_lanes(blend, occluded, s, base, on):  # type: ignore[no-untyped-def]
 def trace_blocks(s, words, blocks, on, intersect, occluded, scene, blend, surface):  # type: ignore[no-untyped-def]
     """Trace the rays of the first `blocks` blocks, and prefetch the rows of the hit triangles.
 
-    Shading starts after all blocks are traced, when the rows have arrived in the cache.
+    Shading starts after all blocks are traced; by then the rows have arrived in the cache.
 
     s, words : blocks; on : (8,) int32, working memory
     surface : (T, 32) float32, see `Surfaces`; a row is two cache lines
@@ -180,7 +180,7 @@ def trace_blocks(s, words, blocks, on, intersect, occluded, scene, blend, surfac
 
 @inner
 def close_gaps(s, blocks):  # type: ignore[no-untyped-def]
-    """Move paths from the last blocks into free lanes of the first ones; return the number of blocks in use.
+    """Move paths from the last blocks into free lanes of the first blocks; return the number of blocks used.
 
     s : blocks, float32
     """

@@ -1,7 +1,7 @@
-"""Settings of a pass as a tuple of integers, the argument of kernels.
+"""Builds the settings of a pass as a tuple of integers, which is an argument of kernels.
 
-This function is not in `estimators`, so that the command line can import the names of estimators without
-loading kernels.
+`path_settings` is not in `pathtracer.estimators`, so that the command line can import the names of estimators
+without loading kernels.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ def path_settings(
     Parameters
     ----------
     estimator : Estimator
-        Options of its paths; `strata` of the estimator is ignored.
+        The estimator; its field `strata` is ignored.
     strata : int or bool
-        Whether the first two random pairs of a path are stratified.
+        Whether samples at the first vertex are stratified, see `Estimator.strata`.
     options : PassOptions
         The limit of reflections and the seed.
     number : int

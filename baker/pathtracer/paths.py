@@ -1,7 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
 """Path tracing in blocks of eight paths. New paths replace ended ones, so that ray packets stay full.
 
-    L = L_e + integral f L cos        one estimate for each path; Russian roulette ends paths without bias
+    L = L_e + integral f L cos
+
+Each path is one estimate of L. Russian roulette ends paths without bias.
 
 Lambertian vertices are shaded in float32, eight at a time (`vertex_simd`). Other vertices are shaded in
 float64, one at a time (`vertex`). Light is summed in float64. Results do not depend on the number of threads:
@@ -99,7 +101,8 @@ from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_H
 
 _f = np.float32
 _L = BLOCK_WIDTH
-# Number of cumulative probabilities up to which a light is chosen by linear search; above it, binary search.
+# Number of lights, including the sky. Up to it, a light is chosen by linear search, above it by binary
+# search.
 _FEW = 16
 _INV_2_32 = 1.0 / 4294967296.0
 # Stack arrays of `trace_paths`.
@@ -165,7 +168,10 @@ def see_sky(s, base, lane, sky, mode, power, value):
 
 @inner
 def start_lanes(s, words, base, where, toward, normal, begin, following, samples, first, at_surface):
-    """Start paths `following` to `following` + 7 in a block, at surface points or as camera rays.
+    """Start the paths of numbers `following` to `following` + 7 in a block.
+
+    Paths start at surface points, or as camera rays.
+
 
     s, words : blocks, float32 and uint32; base : index of the block's first number
     where, toward, normal : (m, k, 3) float64; begin, at_surface : see `trace_paths`
@@ -177,7 +183,7 @@ def start_lanes(s, words, base, where, toward, normal, begin, following, samples
         if following + lane >= m * samples:
             s[base + ALIVE * _L + lane] = _f(0.0)
             continue
-        # Neighbouring lanes hold the same sample of neighbouring points.
+        # Give neighbouring lanes the same sample of neighbouring points.
         sample = (following + lane) // m
         i, k = unsigned(following + lane - sample * m), unsigned((first + sample) % n_positions)
         here = i if len(where) == m else 0
@@ -197,7 +203,7 @@ def start_lanes(s, words, base, where, toward, normal, begin, following, samples
 
 @inner
 def fetch_lanes(s, words, base, surface, material):
-    """Copy the rows and base colours of the triangles that the lanes' rays hit into the block.
+    """Copy the data of the triangles that the lanes' rays hit into the block: rows and base colours.
 
     s, words : blocks; surface : (T, 32), material : (M, 8) float32, see `Surfaces`
     """
@@ -224,7 +230,7 @@ def choose_lights(s, words, base, lights, light):
         if len(cumulative) > _FEW:
             e = pick_light(cumulative, choice)
         else:
-            # Linear search without unpredictable branches.
+            # Search linearly, without branches.
             for k in range(len(cumulative) - 1):
                 e += 1 if cumulative[k] <= choice else 0
         light[lane] = e
@@ -264,9 +270,10 @@ def turn_alone(path, row, lane, s, words, base, hemisphere, value):
 
 @inner
 def aim_alone(path, row, lane, s, words, base, lights, mode, power, value, ray):
-    """Choose a light and sample a ray to it from one lane's vertex, by `vertex.aim`; write it to the block.
+    """Choose a light and sample a ray to it from one lane's vertex, with `vertex.aim`.
 
-    Returns the light's number, or -1 if the contribution is 0.
+    Writes the ray and its contribution to the block. Returns the light's number, or -1 if the contribution is
+    0.
 
     path : (N_ROWS, 8), row : (5, 8) float64; s, words : blocks; lights : `LightTable`
     mode, power : `Estimator.aim` and `.power`
@@ -300,15 +307,16 @@ def trace_paths(
 ):
     """Trace n paths for each of m points, add their light to `out`, and return the numbers of rays.
 
-    where, toward, normal : (m, k, 3) float64, k starts for each point. If `at_surface`: position, shading
-        normal and geometric normal. Else: origin and direction of a ray, `normal` unused. Sample s of pass p
-        takes start (p n + s) modulo k. `where` may be (1, 1, 3), one origin for all rays
+    where, toward, normal : (m, k, 3) float64, k starts for each point. If `at_surface` is true, a start is a
+        position, a shading normal and a geometric normal. Else it is the origin and the direction of a ray,
+        and `normal` is unused. Sample s of pass p uses start (p n + s) modulo k. With shape (1, 1, 3),
+        `where` is the origin of all rays
     begin : number of the first point; random numbers depend on the number of the point
     surfaces : `Surfaces`; lights : `LightTable`; shading : `Shading`; memory : `PathMemory`
     sobol_points : (n, 2) uint32, bit-reversed Sobol points of the n samples of a pass
     settings : `PathSettings`
-    out : (m, 3) float64, sums of radiance along the rays. At a surface point, radiance is E / pi, that of a
-        white Lambertian surface
+    out : (m, 3) float64, sums over the paths of each point; of radiance along the ray or, at a surface point,
+        of E / pi, the radiance of a white Lambertian surface
 
     Returns
     -------
@@ -324,7 +332,8 @@ def trace_paths(
         surfaces.lambertian,
     )
     emitter, triangle, sky, n_lights = lights.emitter, lights.triangle, lights.sky, len(lights.cumulative)
-    # Whether emitters need texture or alpha lookups; whether surfaces need texture or vertex colour lookups.
+    # textured: whether emitters need texture or alpha lookups. painted: whether surfaces need lookups of
+    # textures or vertex colours.
     textured = len(shading.alpha.slot) > 0 or lights.textured != 0
     painted = surfaces.painted != 0
     hemisphere, mode, strata, power = settings.hemisphere, settings.aim, settings.strata, settings.power

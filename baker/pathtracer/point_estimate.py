@@ -1,4 +1,4 @@
-"""Means over passes and their standard errors, for points whose numbers of passes differ."""
+"""Means over passes and their standard errors, for points that may have different numbers of passes."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ SAMPLES_PER_PASS = 16
 
 @dataclass
 class PointEstimate:
-    """Means over passes of C values at n points. Points may have different numbers of passes.
+    """Sums over passes of C values at n points. Points may have different numbers of passes.
 
-    A pass computes the mean of `samples` samples at each point of a subset. Along the first axis of the
-    arrays, index 0 is for even passes and index 1 for odd passes.
+    A pass computes the mean of `samples` samples at some or all points. Along the first axis of the arrays,
+    index 0 is for even passes and index 1 for odd passes.
 
     Attributes
     ----------
     total : (2, n, C) float64
-        Sum of the passes' means.
+        Sum over passes of the means.
     squares : (2, n, C) float64
-        Sum of the squares of the passes' means.
+        Sum over passes of the squared means.
     count : (2, n) int64
         Number of passes of each point.
     samples : int
@@ -59,7 +59,7 @@ class PointEstimate:
         return error
 
     def half(self, which: int) -> NDArray[np.float64]:
-        """Return the mean (n, C) of the even (`which` = 0) or odd (1) passes, which are independent."""
+        """Return the mean (n, C) of the even passes (`which` = 0) or of the odd passes (`which` = 1)."""
         mean: NDArray[np.float64] = self.total[which] / np.maximum(self.count[which], 1)[:, None]
         return mean
 

@@ -1,4 +1,4 @@
-"""Radiance along camera rays, in passes; see `irradiance` for the definition of a pass."""
+"""Radiance along camera rays, in passes; `pathtracer.irradiance` defines a pass."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ def radiance_pass(
     options: PassOptions = DEFAULT_OPTIONS,
     progress: Progress = silent,
 ) -> None:
-    """Add one pass of path-traced radiance, cd/m2, through every pixel to an estimate.
+    """Add one pass of path tracing to an estimate of the radiance of all pixels, cd/m2.
 
     Parameters
     ----------
     reference : Reference
         The scene.
     estimate : PointEstimate
-        Estimate of height * width pixels, 3 channels; row 0 of the picture is on top. Changed in place.
+        Estimate for height * width pixels, R, G and B; row 0 of the picture is on top. Changed in place.
     camera : Camera
         The camera, in world space.
     width : int
@@ -46,7 +46,8 @@ def radiance_pass(
     height : int
         Height of the picture, pixels.
     options : PassOptions
-        Estimator, limit of reflections between a light and the first surface that the camera sees, and seed.
+        Estimator, limit of reflections, and seed. The reflection at the first surface that the camera sees is
+        not counted.
     progress : Progress
         Called with stage, fraction and detail.
 

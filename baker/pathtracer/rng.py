@@ -1,8 +1,8 @@
-"""Random numbers of paths. They depend on seed, pass, point, sample and number of the vertex only.
+"""Random numbers of paths, which depend only on seed, pass, point, sample and number of the vertex.
 
 `draw` returns the next number of a SplitMix64 generator, whose state `path_state` computes from (seed, pass,
 point, sample). `random_lanes` hashes (seed, pass, point, sample, vertex) for eight paths at once. It
-multiplies 32-bit integers only, because SIMD instructions multiply eight of them at a time.
+multiplies only 32-bit integers, because SIMD instructions multiply eight of these at a time.
 
 Based on: Steele, Lea and Flood, Fast splittable pseudorandom number generators, 2014; Jarzynski and Olano,
 Hash functions for GPU rendering, 2020 (pcg4d).
@@ -103,7 +103,7 @@ def mix4(x, y, z, w):  # type: ignore[no-untyped-def]
 
 
 def seed_salt(seed: int) -> int:
-    """Return the hash of a seed, below 2^32, that `random_lanes` adds to the number of the vertex."""
+    """Return the hash of a seed, below 2^32, which `random_lanes` adds to twice the number of the vertex."""
     # Hash an array, because NumPy scalars warn of overflow.
     return int(hash_u32(np.array([(seed ^ (seed >> 32)) & 0xFFFFFFFF], np.uint32))[0])
 
@@ -134,10 +134,10 @@ def random_lanes(words, base, number, salt):  # type: ignore[no-untyped-def]
 
 @inner
 def spread_lanes(words, base, sobol_points, number, salt):  # type: ignore[no-untyped-def]
-    """Stratify the light pair and the direction pair of paths that are at their first vertex.
+    """Replace the random numbers of paths at their first vertex by stratified ones.
 
-    Each pair is replaced by a point of a (0,2)-sequence that is scrambled independently for each point, pass
-    and pair.
+    The pair that samples a light and the pair that samples a direction are each replaced by a point of a
+    (0,2)-sequence. The sequence is scrambled independently for each point, pass and pair.
 
     words : blocks, uint32, see `path_blocks`; base : index of the block's first number
     sobol_points : (n, 2) uint32, bit-reversed Sobol points; number, salt : see `random_lanes`

@@ -44,10 +44,10 @@ CORNER, SHADING, FACE, MATERIAL, TWO_SIDED, EMITTER, TEXTURED, EMISSION, SHINES 
     25,
     28,
 )
-# Columns of `Surfaces.row`: 32 float32 fill two cache lines of 64 bytes.
+# Number of columns of `Surfaces.row`: 32 float32 fill two cache lines of 64 bytes.
 ROW_LENGTH = 32
 # Columns of a material in `Surfaces.material`: base colour (3), metallic, roughness, 1 if a texture scales
-# metallic and roughness. Each row has MATERIAL_LENGTH numbers.
+# metallic and roughness else 0. A row has MATERIAL_LENGTH numbers.
 BASE_COLOUR, MATERIAL_METALLIC, MATERIAL_ROUGHNESS, MATERIAL_TEXTURED, MATERIAL_LENGTH = 0, 3, 4, 5, 8
 # Quantile of the triangle sizes; `Surfaces.default_size` is twice the size at this quantile.
 _SMALL = 0.1
@@ -63,10 +63,9 @@ class Surfaces(NamedTuple):
     material : (M, 8) float32
         Materials. Columns: `BASE_COLOUR` to `MATERIAL_TEXTURED` of this module.
     min_offset_scale : float
-        Metres: coordinates smaller than this value are replaced by it when the offset of a ray origin is
-        computed, see `vertex.offset_origin`.
+        Metres, lower limit of the largest coordinate in `vertex.offset_origin`.
     default_size : float
-        Metres: triangle size assumed for a ray origin whose triangle is unknown.
+        Metres, triangle size assumed for a ray origin whose triangle is unknown.
     lambertian : int
         1 if all surfaces are Lambertian.
     painted : int
@@ -102,8 +101,8 @@ class Reference:
     threads : int
         Number of threads of a pass.
     hit_kind : (T,) uint8
-        What a hit on each triangle says about the ray's origin, see `kernels.probe`. All 0 if built without
-        `find_solids`.
+        What a hit on each triangle implies about the ray's origin, see `kernels.probe`. All 0 if built
+        without `find_solids`.
     """
 
     geometry: Geometry
@@ -181,7 +180,7 @@ def build_reference(
 
 
 def _no_atlas(scene: Scene) -> Atlas:
-    """Return an atlas whose uv are 0 and whose layouts keep the vertices of the meshes."""
+    """Return an atlas for a scene without lightmap: all uv are 0, and vertices are those of the meshes."""
     layouts = []
     for index, instance in enumerate(scene.instances):
         mesh = scene.meshes[instance.mesh]
@@ -205,8 +204,8 @@ def _sphere(geometry: Geometry) -> NDArray[np.float64]:
     if not len(geometry.position):
         return np.array([0.0, 0.0, 0.0, 1.0])
     low, high = geometry.position.min(axis=0).astype(float), geometry.position.max(axis=0).astype(float)
-    # Slightly more than half the diagonal: parallel light starts on discs of this radius, which must not
-    # touch the scene.
+    # Use slightly more than half the diagonal, because light subpaths of parallel light start on discs of
+    # this radius, which must not touch the scene.
     radius = max(0.501 * float(np.linalg.norm(high - low)), 1e-9)
     return np.array([*(0.5 * (low + high)), radius])
 
@@ -221,8 +220,8 @@ def _surfaces(geometry: Geometry, shading: Shading, lights: LightTable, lamberti
     row[:, TWO_SIDED] = geometry.double_sided
     row[:, EMITTER] = lights.code
     row[:, EMISSION : EMISSION + 3] = shading.emission[material]
-    # Read emission from the materials, not from the light table: rays that hit an emitter then add its light
-    # even if the light table lacks it.
+    # Read emission from the materials, not from the light table. So rays that hit an emitter add its light
+    # even if the light table lacks the emitter.
     emits = (shading.emission.max(axis=1, initial=0.0) > 0)[material] & (geometry.area > 0)
     row[:, SHINES] = np.where(emits, 1 + (shading.emission_texture >= 0)[material], 0)
     painted = shading.base_texture >= 0

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Shadow rays, collected in packets by light. A packet is traced when eight rays of any paths fill it."""
+"""Shadow rays, collected in packets by light. A packet is traced when it contains eight rays."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def cast_packet(bins, filled, k, occluded, scene, blend, on, out):
 
 @inner
 def cast_to_lights(s, base, light, n_lights, bins, filled, occluded, scene, blend, on, out):
-    """Append the light rays of a block's lanes to the packets of their lights; trace packets that are full.
+    """Append the shadow rays of a block's lanes to the packets of their lights; trace full packets.
 
     s : blocks, float32; base : index of the block's first number
     light : (8,) int64, number of each lane's light, -1 without a ray; n_lights : number of all lights

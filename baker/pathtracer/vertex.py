@@ -1,9 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
 """Functions for one vertex of a path: set it up at a hit, sample a light, sample the next direction.
 
-Column `lane` of `path` is the state of one path, with the rows below. Column `lane` of `row` is the BSDF
-parameters of the surface at its vertex (see `bsdf`). Directions in `path` are in world space, except `TO`,
-which is in the frame of the shading normal.
+Column `lane` of `path` is the state of one path, with the rows below. Column `lane` of `row` contains the
+BSDF parameters of the surface at the path's vertex (see `pathtracer.bsdf`). Directions in `path` are in world
+space, except `TO`, which is in the frame of the shading normal.
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ from baker.trace.jit import inner
 #     GO          unit direction of the next ray (3)
 #     BETA        throughput (3)
 #     COLLECTED   light found so far (3)
-#     DENSITY     density, per steradian, with which GO was sampled; 0 if emission at the next hit gets no MIS
-#                 weight
+#  DENSITY     density, per steradian, with which GO was sampled; 0 if emission at the next hit has the MIS
+#              weight 1
 #     NORMAL      unit geometric normal, on the side that was hit (3)
 #     FRAME       tangent, bitangent and shading normal (9)
 #     TO          unit direction to the previous vertex, in FRAME (3)
@@ -79,14 +79,14 @@ N_ROWS = 32
 # Columns of `ray`, a ray to a light: unit direction (3), length in metres, barycentrics of its end on an
 # emitter.
 RAY_LENGTH, RAY_B1, RAY_B2 = 3, 4, 5
-# Cosine between the interpolated normal and the view direction. At smaller cosines, glossy surfaces use the
-# geometric normal instead.
+# Cosine between the interpolated normal and the view direction. Up to it, surfaces that are not Lambertian
+# use the geometric normal instead.
 GRAZE = 1.0e-3
-# The offset of a ray origin from its surface is OFFSET times the smaller of two lengths: the largest
-# coordinate, and the size of the triangle. It is at least ROUNDING, sixteen float32 epsilons, times the
-# larger of the two lengths (as in `kernels.surface`).
+# Factors of the offset of ray origins, as in `kernels.surface`. The offset is OFFSET times the smaller of two
+# lengths: the largest coordinate of the origin, and the size of the triangle. It is at least ROUNDING
+# (sixteen float32 epsilons) times the larger of the two lengths.
 OFFSET, ROUNDING = 1.0e-5, 1.9e-6
-# Number of bounces before Russian roulette starts, and upper limit of the survival probability.
+# SURE: number of bounces before Russian roulette starts. MOST: upper limit of the survival probability.
 SURE, MOST = 3, 0.98
 
 
@@ -149,8 +149,8 @@ def start_path(path, row, lane, where, toward, normal, at_surface, sizes):
     The surface point is treated as white and Lambertian, so its radiance is E / pi.
 
     path : (N_ROWS, n) float64; row : (5, n) float64
-    where, toward, normal : (3,) float64. At a surface: position, shading normal, geometric normal. For a
-        camera ray: origin, direction, unused
+    where, toward, normal : (3,) float64. For a surface point, they are position, shading normal and geometric
+        normal. For a camera ray, they are origin and direction, and `normal` is unused
     sizes : `Surfaces.min_offset_scale` and `.default_size`
     """
     for c in range(3):
@@ -204,12 +204,12 @@ def arrive(path, row, lane, surface, material, prim, u, v, min_offset_scale, lam
     path[SHADED, lane], path[SHADED + 1, lane], path[SHADED + 2, lane] = nx, ny, nz
     glossy = lambertian == 0
     if glossy and nx * dx + ny * dy + nz * dz >= -GRAZE:
-        # The interpolated normal does not face the viewer: use the geometric normal.
+        # Use the geometric normal, because the interpolated normal does not face the viewer.
         nx, ny, nz = path[NORMAL, lane], path[NORMAL + 1, lane], path[NORMAL + 2, lane]
     set_frame(path, lane, nx, ny, nz)
     tx, ty, tz = local(path, lane, -dx, -dy, -dz)
-    # Lambertian radiance is the same in all directions, so a view direction below the horizon of the shading
-    # normal is clamped to the horizon.
+    # On Lambertian surfaces, clamp a view direction below the horizon of the shading normal to the horizon.
+    # This changes no radiance, which is the same in all directions.
     path[TO, lane], path[TO + 1, lane], path[TO + 2, lane] = tx, ty, tz if glossy else max(tz, 1.0e-6)
     m = np.int64(surface[prim, MATERIAL])
     for c in range(3):
@@ -338,7 +338,7 @@ def multiply_emission_texture(shading, prim, u, v, value, rgba, aimed):
 
     rgba : (4,) float64, working memory
     aimed : whether the ray was sampled towards the triangle. If so, `value` is multiplied by alpha as well.
-        Rays that hit the triangle by chance have passed the hit filter, which applies alpha
+        For rays that hit the triangle by chance, the hit filter has already applied alpha
     """
     m = shading.material[prim]
     there = opacity_at(shading, prim, u, v) if aimed else 1.0
@@ -353,7 +353,7 @@ def multiply_emission_texture(shading, prim, u, v, value, rgba, aimed):
 
 @inner
 def scatter(path, row, lane, hemisphere, choice, u, w, weight):
-    """Sample the next direction of a path, and multiply its throughput; return False if the path ends.
+    """Sample the next direction of a path, and update its throughput; return False if the path ends.
 
     path : (N_ROWS, n) float64; row : (5, n) float64; weight : (3,) float64, working memory
     hemisphere : `Estimator.hemisphere`
@@ -362,7 +362,7 @@ def scatter(path, row, lane, hemisphere, choice, u, w, weight):
     vx, vy, vz = path[TO, lane], path[TO + 1, lane], path[TO + 2, lane]
     mirror = 0.0
     if row[WIDTH, lane] >= 0.0 and hemisphere != 0:
-        # Only BSDF sampling finds the direction of a mirror reflection.
+        # Choose mirror reflections with this probability, because only BSDF sampling finds their direction.
         mirror = specular_chance(row, lane, vz) if row[WIDTH, lane] < SMOOTH else 0.0
     if hemisphere == 0 or choice < mirror:
         lx, ly, lz, density, smooth = bsdf_sample(row, lane, vx, vy, vz, choice, u, w, weight)

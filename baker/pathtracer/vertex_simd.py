@@ -1,15 +1,15 @@
 # mypy: disable-error-code="no-untyped-def"
 """Shading of Lambertian vertices, eight paths at a time, in loops that the compiler vectorizes.
 
-These functions compute in float32 what `vertex` computes for one path in float64: vertices from hits, light
-samples, and the next directions. They use selections instead of branches.
+These functions compute in float32 what `pathtracer.vertex` computes for one path in float64: vertices from
+hits, light samples, and the next directions. They use selections instead of branches.
 
     contribution of a light sample    beta albedo / pi cos L w / density
     its MIS weight w                  density / (density + cos / pi)        (balance heuristic)
     next direction                    density cos / pi; beta is multiplied by albedo
 
-beta is the throughput, cos is the cosine of the sampled direction to the shading normal, and L is the
-radiance that arrives from the light.
+beta is the throughput, cos is the cosine of the sampled direction to the shading normal, L is the radiance of
+the light, and density is per steradian.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ from baker.trace.jit import inner
 from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, HIT_U, HIT_V, ORG_X, ORG_Y, ORG_Z
 
 _f = np.float32
-# Constants in float32: a float64 constant would convert whole expressions to float64.
+# Constants are in float32, because a float64 constant would convert whole expressions to float64.
 _ZERO, _ONE = _f(0.0), _f(1.0)
 _PI, _INV_PI = _f(math.pi), _f(1.0 / math.pi)
 _OFFSET, _ROUNDING, _SHORT, _FAR = _f(OFFSET), _f(ROUNDING), _f(SHORT), _f(FAR)
@@ -86,7 +86,10 @@ _L = BLOCK_WIDTH
 
 @inner
 def offset_and_frame(s, base, lane, x, y, z, min_offset_scale, size):
-    """Write a lane's ray origin, (x, y, z) offset along `NORMAL`, and the tangent frame of its `SHADED`.
+    """Write a lane's ray origin and tangent frame.
+
+    The origin is (x, y, z), offset along `NORMAL`. The tangent frame is about `SHADED`.
+
 
     s : blocks, float32, with `NORMAL` and `SHADED` of the lane
     base : index of the block's first number
@@ -147,7 +150,7 @@ def weighted(s, base, column, lane, b, u, v):
 
 @inner
 def arrive_lanes(s, base, min_offset_scale):
-    """Set up the vertices at the lanes' hits; end paths at black backs.
+    """Set up the vertices at the lanes' hits; end paths that hit the black back of a one-sided surface.
 
     s : blocks, float32, with copies of the hit triangles
     min_offset_scale : float32, metres, see `Surfaces`
@@ -186,7 +189,7 @@ def arrive_lanes(s, base, min_offset_scale):
 
 @inner
 def look_up_falloff(s, base, lights, light):
-    """Multiply the gain of each lane's tabulated light by its tabulated fall-off, and set its kind to even.
+    """Multiply ROW_GAIN of each lane's tabulated light by its fall-off, and set ROW_KIND to KIND_EVEN.
 
     s : blocks, with copies of the lights; lights : `LightTable`
     light : (8,) int64, numbers of the lanes' lights
@@ -215,7 +218,7 @@ def look_up_falloff(s, base, lights, light):
 def aim_at_lights(s, base, mode, power):
     """Sample a ray from each lane's vertex to the lane's light.
 
-    Writes its unit direction, its length in metres, and the contribution if nothing blocks it. The
+    Writes the unit direction of the ray, its length in metres, and its contribution if nothing blocks it. The
     contribution is 0 if the ray points below the surface.
 
     s : blocks, float32, with copies of the lights; mode, power : `Estimator.aim` and `.power`
@@ -226,8 +229,8 @@ def aim_at_lights(s, base, mode, power):
         kind = s[base + _M + ROW_KIND * _L + lane]
         sky = kind == _SKY
         b1, b2 = triangle_barycentric(u, w)
-        # Vector to a point on the light. For lights without area, the edges are 0. For parallel light and the
-        # sky, `near` is 0.
+        # Compute the vector to a point on the light. For lights without area, the edges are 0. For parallel
+        # light and the sky, `near` is 0.
         near = _ONE if kind < _PARALLEL else _ZERO
         dx = (
             s[base + _M + ROW_ORIGIN * _L + lane]
@@ -247,7 +250,7 @@ def aim_at_lights(s, base, mode, power):
             + b2 * s[base + _M + (ROW_EDGE + 5) * _L + lane]
             - near * s[base + ORG_Z * _L + lane]
         )
-        # Cosine-weighted direction for the sky
+        # Sample a cosine-weighted direction for the sky
         a, b, c = cosine_direction(u, w)
         tx, ty, tz = (
             s[base + TANGENT * _L + lane],
@@ -271,7 +274,7 @@ def aim_at_lights(s, base, mode, power):
         length = math.sqrt(square)
         shrink = _ONE / length
         dx, dy, dz = dx * shrink, dy * shrink, dz * shrink
-        # Cosine and fall-off at the light
+        # Compute cosine and fall-off at the light
         at_light = -(
             dx * s[base + _M + ROW_NORMAL * _L + lane]
             + dy * s[base + _M + (ROW_NORMAL + 1) * _L + lane]
@@ -282,8 +285,9 @@ def aim_at_lights(s, base, mode, power):
             base + _M + ROW_CONE_SCALE * _L + lane
         ]
         inside = min(max(inside, _ZERO), _ONE)
-        # Gain: for emitters and the sky, 1 / density per steradian. For lights without area, irradiance of a
-        # surface that faces the light, per unit intensity, divided by the light's probability.
+        # Compute the gain. For emitters and the sky, it is 1 / density, per steradian. For lights without
+        # area, it is the irradiance of a surface that faces the light, per unit intensity, divided by the
+        # light's probability.
         here = dx * nx + dy * ny + dz * nz
         gain = s[base + _M + ROW_GAIN * _L + lane]
         area = kind == _EMITTER
@@ -297,7 +301,7 @@ def aim_at_lights(s, base, mode, power):
             + dy * s[base + (NORMAL + 1) * _L + lane]
             + dz * s[base + (NORMAL + 2) * _L + lane]
         )
-        # MIS weight
+        # Compute the MIS weight
         ratio = here * _INV_PI * gain
         ratio = ratio * ratio if power != 0 else ratio
         spread = area or sky

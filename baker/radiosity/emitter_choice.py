@@ -1,10 +1,8 @@
 """Chooses the emitter clusters that the texels of a tile sample, and the numbers of samples.
 
-`kernels.emitters.cluster_chances` estimates the unoccluded irradiance that each cluster of emitters
-causes. With these estimates alone, a very bright emitter behind a wall would get nearly all samples.
-Therefore a few
-shadow
-rays, the probe rays, are cast from the tile to each cluster to find whether it is visible.
+`kernels.emitters.cluster_chances` estimates the unoccluded irradiance that each cluster of emitters causes.
+With these estimates alone, a very bright emitter behind a wall would get nearly all samples. Therefore a few
+shadow rays, the probe rays, are cast from the tile to each cluster to find whether it is visible.
 
 - The samples are distributed over the visible clusters.
 - Clusters that no probe ray reaches are called hidden. They form a separate stratum with few samples, which
@@ -48,12 +46,11 @@ _COST = 0.06
 # Number of clusters in the scene. Up to it, all hidden clusters are in the separate stratum.
 _FEW = 32
 # Total weight (power / distance^2) of hidden clusters, as a share of the visible clusters' total weight. If
-# there
-# are more than _FEW clusters, the dimmest hidden clusters up to this total are sampled with the visible ones.
+# there are more than _FEW clusters, the dimmest hidden clusters up to this total are sampled with the visible
+# ones.
 _HARMLESS = 0.25
 # Ratio of the weights of two visible clusters. Above it, clusters are chosen for each block if the cluster of
-# larger
-# weight is visible from only a part of the tile.
+# larger weight is visible from only a part of the tile.
 _OUTSHINES = 4.0
 # Cosine between the normals of consecutive texels. Below it, a new block begins.
 _TURN = 0.5
@@ -237,8 +234,7 @@ class EmitterChooser:
         return asked, seen
 
     def _weights(self, all_emitters: TileEmitters, origin: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Return (C,) float64: power / distance^2 of each cluster; 0 for clusters that face away from the
-        points.
+        """Return (C,) float64: power / distance^2 of each cluster; 0 if it faces away from the points.
 
         origin : (m, w, 3) float32, metres, world; distances are from the centre of the points' bounding box
         """

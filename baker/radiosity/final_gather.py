@@ -1,8 +1,7 @@
 """The final gather: irradiance and ambient occlusion of the texels in the page, from hemisphere rays.
 
 Each ray reads the light that the texel at its hit reflects. Ambient occlusion uses the same rays. Front
-texels are
-the entries stored in the page; the backs of double-sided surfaces are not gathered.
+texels are the entries stored in the page; the backs of double-sided surfaces are not gathered.
 """
 
 from __future__ import annotations

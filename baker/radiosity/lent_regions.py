@@ -1,17 +1,15 @@
 """Assigns regions to invalid texels, which are later filled from neighbours of the same region.
 
 Invalid texels are texels whose points are all inside geometry. Regions are the parts of a chart that other
-surfaces
-separate (`radiosity.sides`). For example, a ceiling continues over a wall between a dark room and the bright
-outside. The ceiling's texels above the wall are invalid. Engines interpolate between texel centres, so a
-lookup on the ceiling of the room near the wall reads these texels. If they were filled with light from
-outside, the
-ceiling would show a bright line.
+surfaces separate (`radiosity.sides`). For example, a ceiling continues over a wall between a dark room and
+the bright outside. The ceiling's texels above the wall are invalid. Engines interpolate between texel
+centres, so a lookup on the ceiling of the room near the wall reads these texels. If they were filled with
+light from outside, the ceiling would show a bright line.
 
 A bilinear lookup at a point of a neighbouring texel reads the invalid texel with a certain weight. For each
 region, these weights are summed over all valid points of the neighbours in the region. The invalid texel gets
-the
-region with the largest sum. If all sums are 0, the texel gets the region of the nearest texel of its chart.
+the region with the largest sum. If all sums are 0, the texel gets the region of the nearest texel of its
+chart.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """The 16 sample points of each texel, from which rays start.
 
 Points are computed tile by tile to save memory. In small scenes they are also stored for later stages,
-because
-computing the points takes about a tenth of the time of tracing their rays.
+because computing the points takes about a tenth of the time of tracing their rays.
 """
 
 from __future__ import annotations

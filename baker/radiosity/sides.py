@@ -1,20 +1,16 @@
 """Splits texels that another surface passes through, and groups texels into regions.
 
 For example, a floor continues under a wall, or a beam passes through it. A texel where the two surfaces meet
-has
-points on both sides of the other surface. A single value per texel would mix the light of both sides.
+has points on both sides of the other surface. A single value per texel would mix the light of both sides.
 
 Therefore the points of such a texel are grouped by mutual visibility (`radiosity.kernels.sides`). Each group,
 called a side, becomes a texel entry (a row of `TexelBuffer`). In general, the side with most points gets the
-texel's
-original entry, which is a front or a back; fronts are stored in the page. The other sides get new entries
-after all
-backs. The new entries take part in light transport but are not stored in the page.
+texel's original entry, which is a front or a back; fronts are stored in the page. The other sides get new
+entries after all backs. The new entries take part in light transport but are not stored in the page.
 
 Neighbouring texels are linked if some of their points are mutually visible. The connected parts of a chart
 are its regions. Filters of the finished page do not mix values of different regions. Two texels of a block
-that
-no chain of links within the block connects belong to different patches (`radiosity.patches`).
+that no chain of links within the block connects belong to different patches (`radiosity.patches`).
 """
 
 from __future__ import annotations
@@ -46,17 +42,15 @@ from baker.radiosity.trace_job import TraceJob
 from baker.trace.packets import PacketBuffers
 
 # Items per tile: texels that are tested (_TILE), texels whose points are grouped (_SUSPECTS), pairs of
-# neighbouring
-# entries (_PAIRS).
+# neighbouring entries (_PAIRS).
 _TILE = 4096
 _SUSPECTS, _PAIRS = 1024, 2048
 # Number of the point that the first test of two neighbours uses in each of them. The second test uses all
 # points.
 _ONE = np.zeros((1, 1), np.uint8)
 # _MANY_BACKS: share of a side's rays that hit black backs, the backs of one-sided surfaces. Above it, the
-# side is
-# treated as outside the model. _OUTSIDE: weight of the points of a side outside the model; other points have
-# weight 1.
+# side is treated as outside the model. _OUTSIDE: weight of the points of a side outside the model; other
+# points have weight 1.
 _MANY_BACKS, _OUTSIDE = 0.25, 0.25
 _EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
 _BITS = np.uint32(1) << np.arange(N_POINTS, dtype=np.uint32)

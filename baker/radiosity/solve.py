@@ -8,16 +8,13 @@ With M = s + rho E, the radiosity without emission, and the patch areas A, this 
 
 The matrix A / rho - A F is symmetric by reciprocity, and positive definite for rho < 1. Conjugate gradients,
 preconditioned by A / rho, need a few dozen products with F. Jacobi sweeps would need thousands in a closed
-scene of
-albedo 0.99. If the number of bounces is fixed, one product is computed for each bounce after the first.
+scene of albedo 0.99. If the number of bounces is fixed, one product is computed for each bounce after the
+first.
 
 The norms of conjugate gradients are sums over all patches. Patches of a dim room beside a sunlit street
-contribute
-almost nothing to these sums, so the iteration could stop before these patches have converged. Therefore the
-residual of
-each patch and colour is compared with the exitance of that patch. Conjugate gradients are then started again
-for the
-residual of the patches that have not converged.
+contribute almost nothing to these sums, so the iteration could stop before these patches have converged.
+Therefore the residual of each patch and colour is compared with the exitance of that patch. Conjugate
+gradients are then started again for the residual of the patches that have not converged.
 
 Based on: Goral et al., Modeling the interaction of light between diffuse surfaces, 1984; Neumann,
 New efficient algorithms with positive definite radiosity matrix, 1994; Saad, Iterative methods for
@@ -52,8 +49,7 @@ _PART = 250_000
 # exitance of the same colour. Because of this limit, nearly black patches do not delay the solve.
 _DARK = 1e-15
 # Ratio of the residual norm to its initial value. Below it, conjugate gradients are started again, because
-# the search
-# directions have lost orthogonality, and the updated residual differs from the true residual.
+# the search directions have lost orthogonality, and the updated residual differs from the true residual.
 _REDUCTION = 1e-12
 # Upper limit of albedo: with albedo 1, a closed scene has no solution.
 MAX_ALBEDO = 0.999

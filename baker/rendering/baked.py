@@ -1,4 +1,4 @@
-"""Radiance of surfaces lit by a bake: lightmaps are looked up bilinearly, as engines do."""
+"""Radiance of surfaces lit by a bake, with bilinear lookups of the lightmaps as in engines."""
 
 from __future__ import annotations
 
@@ -56,9 +56,9 @@ class BakedLight:
         return cls(bake, world_geometry(bake.scene, bake.atlas))
 
     def radiance(self, reference: Reference, hits: FirstHits) -> NDArray[np.float64]:
-        """Return the radiance (n, 3), cd/m2, that leaves n hits towards the camera.
+        """Return the radiance (n, 3), cd/m2, from n first hits towards the camera.
 
-        It is 0 for rays without a hit and at the backs of one-sided surfaces.
+        It is 0 for rays without a hit, and for hits on backs of one-sided surfaces.
         """
         light = np.zeros((len(hits.triangle), 3))
         lit = np.flatnonzero(hits.lit)
@@ -91,7 +91,7 @@ def add_emission(chosen, surface, triangle, bary, shading, light):  # type: igno
 
 
 def other_scene(bake: StoredBake, scene: Path, *, allow_outside: bool) -> list[SceneWarning]:
-    """Return a list with one warning if a scene file differs from the baked file; otherwise, an empty list.
+    """Return one warning if a scene file differs from the baked file, else an empty list.
 
     `allow_outside` is passed to `load_scene`.
 

@@ -19,7 +19,7 @@ def named_camera(cameras: Sequence[Camera], text: str) -> Camera:
     cameras : sequence of Camera
         Cameras of the file, in its order.
     text : str
-        A name, or an index from 0. A camera with this name is preferred to the camera with this index.
+        A name, or an index from 0. If both exist, the camera with this name is returned.
 
     Returns
     -------

@@ -28,10 +28,10 @@ from baker.pathtracer.scene import Reference
 from baker.rendering.baked import BakedLight
 from baker.rendering.settings import RenderSettings
 
-# Number of samples of a pixel in one pass, for radiance and for ambient occlusion.
+# Largest number of samples of a pixel in one pass: for radiance, and for ambient occlusion.
 _PASS, _OPENNESS_PASS = 4, 16
-# Samples per second on a slow machine, for radiance and for ambient occlusion. With a time limit, they
-# determine the number of samples in a pass.
+# Samples per second on a slow machine, for radiance and for ambient occlusion. If there is a time limit,
+# these rates limit the number of samples in a pass.
 _RATE, _OPENNESS_RATE = 2.0e4, 2.0e5
 # Number of pixels of a block.
 _BLOCK = 1 << 14
@@ -72,10 +72,10 @@ class RenderRun:
         return self.settings.width * self.settings.height
 
     def samples(self, most: int, rate: float) -> int:
-        """Return the number of samples of a pixel in a pass: `most`, or fewer, but at least 1.
+        """Return the number of samples of a pixel in a pass, from 1 to `most`.
 
-        It is at most half the requested samples, so that there are two passes. With a time limit, a pass at
-        `rate` samples per second takes at most that time.
+        It is at most half the requested samples, so that there are at least two passes. If there is a time
+        limit, a pass at `rate` samples per second takes at most that time.
         """
         goal, limit = self.settings.goal, self.settings.time_limit
         if goal is not None:
@@ -85,7 +85,7 @@ class RenderRun:
         return max(most, 1)
 
     def enough(self, estimate: PointEstimate) -> bool:
-        """Return whether rendering can end: all samples are done, or one more pass exceeds the time limit."""
+        """Return whether to end: all samples are done, or one more pass would exceed the time limit."""
         now = time.monotonic()
         last, self.passed = now - self.passed, now
         self.show(estimate, 0.0)
@@ -98,7 +98,7 @@ class RenderRun:
         return limit is not None and now - self.start + last > limit
 
     def show(self, estimate: PointEstimate, part: float) -> None:
-        """Report the progress of the picture, of which the fraction `part` of the next pass is done."""
+        """Report the progress of the picture; `part` is the fraction of the current pass that is done."""
         goal, limit = self.settings.goal, self.settings.time_limit
         done = estimate.rounds * estimate.samples
         by_samples = 0.0 if goal is None else (done + part * estimate.samples) / goal
@@ -114,7 +114,7 @@ class RenderRun:
         return scaled
 
     def hits(self, begin: int, end: int, number: int) -> FirstHits:
-        """Return the first hits, in pass `number`, of one ray through each of pixels `begin` to `end` - 1."""
+        """Return first hits of one ray through each pixel from `begin` to `end` - 1, in pass `number`."""
         settings, camera = self.settings, self.camera
         pixel = np.arange(begin, end)
         direction = camera_rays(camera, settings.width, settings.height, pixel, 1, settings.seed, number)
@@ -147,7 +147,7 @@ def traced(run: RenderRun) -> PointEstimate:
 
 
 def ambient_occlusion(run: RenderRun, distance: float) -> PointEstimate:
-    """Return ambient occlusion (H * W, 1), 0 to 1. A camera ray without a hit contributes 1."""
+    """Return ambient occlusion (H * W, 1), 0 to 1. Camera rays without a hit contribute 1."""
     estimate = new_estimate(run.pixels, 1, run.samples(_OPENNESS_PASS, _OPENNESS_RATE))
     while not run.enough(estimate):
         cast = run.pixels
@@ -175,8 +175,8 @@ def ambient_occlusion(run: RenderRun, distance: float) -> PointEstimate:
 def lit_by(run: RenderRun, baked: BakedLight, sky: tuple[float, float, float]) -> PointEstimate:
     """Return the radiance (H * W, 3), cd/m2, that an engine shows with the bake.
 
-    It is albedo x irradiance / pi + emission at first hits, and `sky` for rays without a hit. Both are
-    multiplied by the transmittance of `BLEND` surfaces.
+    At first hits, it is albedo x irradiance / pi + emission. For rays without a hit, it is `sky`. Both are
+    multiplied by `FirstHits.kept`, for the `BLEND` surfaces that the ray passed.
     """
     estimate = new_estimate(run.pixels, 3, 1)
 
@@ -196,8 +196,8 @@ def lit_by(run: RenderRun, baked: BakedLight, sky: tuple[float, float, float]) -
 def first_layers(run: RenderRun) -> dict[str, NDArray[np.float32]]:
     """Return the layers of first hits: "albedo", "normal" (H, W, 3) and "depth" (H, W, 1), metres.
 
-    Albedo and normal are means over `_AOV_SAMPLES` camera rays. Depth is the
-    distance of the first ray's hit, 0 without a hit.
+    Albedo and normal are means over `_AOV_SAMPLES` camera rays. Depth is the distance of the hit of the first
+    camera ray, 0 without a hit.
     """
     n = run.pixels
     total: dict[str, NDArray[Any]] = {

@@ -107,8 +107,8 @@ def render(
     ----------
     scene : Scene, Path or str
         The scene, or the path of its file. From a file, textures of metallic and roughness are read as well.
-        With `settings.lightmap`, the scene of the bake is rendered; a path to a different scene gives a
-        warning.
+        With `settings.lightmap`, the scene of the bake is rendered. If `scene` is then the path of a
+        different scene, there is a warning.
     settings : RenderSettings, optional
         Camera, size, samples, and which quantity is rendered.
     progress : Progress
@@ -133,7 +133,8 @@ def render(
     settings = settings or RenderSettings()
     start = time.monotonic()
     report(progress, Stage.LOAD, 0.0)
-    # Parse the seven numbers of a camera before the scene is loaded. The name of a camera needs the scene.
+    # If the camera is given as seven numbers, parse them before the scene is loaded. A name is looked up in
+    # the scene later.
     text = settings.camera
     camera = parse_camera(text) if text is not None and ("," in text or not text) else None
     if settings.denoise:
@@ -204,7 +205,7 @@ def _own_camera(scene: Scene, reference: Reference) -> Camera:
         max(float(np.linalg.norm(high - low)), 1e-6),
     )
     eye = middle + size * np.array([0.35, 0.3, 1.15])
-    # Print enough digits that position and target stay distinct in scenes far from the origin.
+    # Print enough digits to distinguish position and target in scenes far from the origin.
     digits = 4 + int(np.ceil(np.log10(1.0 + np.abs(middle).max() / size)))
     numbers = ",".join(f"{value:.{digits}g}" for value in (*eye, *middle, 45.0))
     raise InputError(

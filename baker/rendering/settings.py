@@ -109,7 +109,10 @@ class RenderSettings(Settings):
         return BakeSettings(sky=self.sky, sky_strength=self.sky_strength).sky_radiance
 
     def ao_reach(self, diagonal: float) -> float:
-        """Return the largest distance of occluders, metres; may be inf. diagonal : of the scene, metres."""
+        """Return the largest distance of occluders, metres; may be inf.
+
+        diagonal : diagonal of the scene's bounding box, metres
+        """
         return (
             BakeSettings().ao_reach(diagonal)
             if self.ao_distance is None
@@ -118,7 +121,7 @@ class RenderSettings(Settings):
 
     @property
     def goal(self) -> int | None:
-        """Return the samples per pixel at which rendering ends; None if only the time limit ends it."""
+        """Return the number of samples per pixel at which rendering ends; None if only time is limited."""
         if self.spp is not None:
             return self.spp
         return None if self.time_limit is not None else DEFAULT_SPP

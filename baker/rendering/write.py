@@ -1,8 +1,8 @@
 """Writes a rendered picture as EXR with its layers, or as PNG.
 
-In a PNG, each component L of the radiance is mapped to L / (L + m) and then by the sRGB curve. m is the
-median luminance of the pixels that are not black. Ambient occlusion is stored linearly, 0 to 1 as 0 to 255. A
-text chunk of the file names the mapping.
+In a PNG, each component L of the radiance is mapped to L / (L + m), and the result is encoded with the sRGB
+curve. m is the median luminance of the pixels that are not black. Ambient occlusion is stored linearly, 0 to
+1 as 0 to 255. A text chunk of the PNG describes the mapping.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from baker.rendering.render import Picture
 
 # Suffixes of picture files.
 SUFFIXES = (".exr", ".png")
-# Descriptions of the tone mapping in a PNG, of radiance and of ambient occlusion.
+# Descriptions of the tone mapping in a PNG: TONE for radiance, PLAIN for ambient occlusion.
 TONE = "L / (L + median luminance), then the sRGB curve"
 PLAIN = "none, 0 to 1 is 0 to 255"
 
@@ -105,7 +105,7 @@ def tone_of(path: Path, picture: Picture) -> str | None:
 
 
 def tone_mapped(picture: Picture) -> NDArray[np.uint8]:
-    """Return the levels (H, W, 3) uint8 of a picture in a PNG, by the mapping in this module's docstring."""
+    """Return the pixels (H, W, 3) uint8 of a picture in a PNG, mapped as the module's docstring describes."""
     colour = picture.colour
     if picture.unit == "1":
         return grey_levels(colour)

@@ -1,1 +1,1 @@
-"""Material tables of a scene for kernels (base colour, emission, alpha, transmittance), and its ray tree."""
+"""Tables of a scene's materials for kernels, and the scene's ray tree."""

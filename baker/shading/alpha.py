@@ -46,9 +46,9 @@ def build_alpha(
     pack : TexturePack
         Textures.
     base_texture : (M,) int32
-        Number in `pack` of each material's base colour texture, -1 for none.
+        For each material, the number of its base colour texture in `pack`, -1 for none.
     base_uv : (V, 2) float32
-        Image uv of each lightmap vertex for this texture; (1, 2) if no material is textured.
+        Image uv of each lightmap vertex for the base colour texture; (1, 2) if no material has one.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def build_alpha(
         Alpha of these triangles.
     """
     mode = np.array([m.alpha_mode for m in scene.materials])
-    # Smallest alpha at which each material blocks all light: the cutoff of MASK, 1 for BLEND.
+    # For each material, the smallest alpha that blocks all light: the cutoff for MASK, 1 for BLEND.
     blocks = np.array(
         [m.alpha_cutoff if m.alpha_mode == "MASK" else 1.0 for m in scene.materials], np.float32
     )

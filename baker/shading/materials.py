@@ -1,4 +1,4 @@
-"""Builds `Shading`: factors and textures of all materials, and the image uv and colour of each vertex."""
+"""Builds `Shading`: factors and textures of all materials; image uv and colour of each lightmap vertex."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def resolve_materials(scene: Scene, geometry: Geometry, *, reflections: bool = F
     def number(texture: Texture | None, linear: bool = False, sharp: bool = False) -> int:
         if texture is None:
             return -1
-        # Use nearest filtering for emission only. For base colour the difference is not visible in a bake.
+        # Use nearest filtering for emission only. For base colour, the difference is not visible in a bake.
         sharp = sharp and texture.nearest
         key = (id(texture.image), texture.wrap, linear, sharp)
         if key not in numbers:

@@ -1,6 +1,6 @@
-"""Classifies the triangles of a scene, and determines what a ray's first hit on each says about its origin.
+"""Classifies triangles, and determines what a ray's first hit on a triangle implies about the ray's origin.
 
-`topology.solids` defines the classes: solids, rooms, covers, and sheets (all other surfaces).
+`topology.solids` defines the classes solid, room and cover. All other surfaces are called sheets.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from baker.topology.solids import BEFORE, BEHIND, Solids, SolidSurfaces, find_so
 
 
 def scene_solids(scene: Scene, geometry: Geometry, shading: Shading) -> Solids:
-    """Classify the closed parts of a scene as solids, rooms and covers.
+    """Classify the parts of a scene as solids, rooms and covers.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def hide_backs(scene: Scene, geometry: Geometry, shading: Shading) -> tuple[Geom
     Geometry
         The geometry with `double_sided` false for these faces.
     hit_kind : (T,) uint8
-        What a first hit on each triangle says about the ray's origin, see `kernels.probe`.
+        What a first hit on each triangle implies about the ray's origin, see `kernels.probe`.
     """
     solids = scene_solids(scene, geometry, shading)
     hidden = solids.sealed & (solids.inside == BEHIND) & geometry.double_sided
@@ -74,10 +74,10 @@ def hide_backs(scene: Scene, geometry: Geometry, shading: Shading) -> tuple[Geom
 
 
 def hit_kinds(geometry: Geometry, shading: Shading, solids: Solids) -> NDArray[np.uint8]:
-    """Return for each triangle what a first hit on it says about the ray's origin.
+    """Return for each triangle what a first hit on it implies about the ray's origin.
 
     Backs of one-sided sheets are black, and backs of covers are treated as black. Hits on rooms and on
-    triangles that let light through say nothing (0).
+    triangles that let light through imply nothing (0).
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def hit_kinds(geometry: Geometry, shading: Shading, solids: Solids) -> NDArray[n
     Returns
     -------
     (T,) uint8
-        See `kernels.probe`.
+        Values as in `kernels.probe`: 0, BLACK_BACK, SOLID_BACK or SOLID_FRONT.
     """
     hit_kind = np.where(geometry.double_sided, 0, BLACK_BACK).astype(np.uint8)
     hit_kind[~_opaque(geometry, shading)] = 0

@@ -1,4 +1,4 @@
-"""Builds the table of BLEND triangles, from which their transmittance is computed at ray hits."""
+"""Builds the table of BLEND triangles, from which kernels compute transmittance at ray hits."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from baker.trace.embree import HitFilter
 
 
 def build_transmittance_table(shading: Shading) -> TransmittanceTable | None:
-    """Find the BLEND triangles, except those whose alpha is 0 everywhere.
+    """Find the BLEND triangles that let light through, except those whose alpha is 0 everywhere.
 
     Parameters
     ----------

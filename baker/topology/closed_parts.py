@@ -1,8 +1,8 @@
 """Finds triangles that form closed surfaces, and the side of each triangle that faces the enclosed space.
 
 A part is a set of triangles of one object that are connected by edges. Open parts whose boundary edges
-coincide are joined, so that a box made of six objects is closed as well. Windings may be inconsistent: the
-test reverses triangles until neighbours traverse their shared edge in opposite directions.
+coincide are joined, so that a box made of six objects is closed as well. The file's windings may be
+inconsistent, so triangles are reversed until neighbours traverse their shared edge in opposite directions.
 """
 
 from __future__ import annotations
@@ -15,22 +15,23 @@ from numpy.typing import NDArray
 from baker.topology.edges import Edges, find_edges
 from baker.topology.weld import connected, number_by_first, number_rows
 
-# Area of a part's holes divided by the area of its triangles, up to which the part is closed.
+# Area of a part's holes divided by the area of its triangles. Up to it, the part is closed.
 SMALL_HOLES = 0.005
-# Area of a part's holes divided by the area of its triangles, up to which the part is watertight. It allows
-# slits without width, at which one edge meets two shorter edges.
+# Area of a part's holes divided by the area of its triangles. Up to it, the part is watertight. It is above 0
+# to allow slits without width, where one edge meets two shorter edges.
 NO_HOLES = 1e-6
-# Volume of a part divided by its area and by its largest distance from the centre, below which the part
-# encloses no space. Offsets of ray origins are about as large, relative to the size of a surface.
+# Volume of a part, divided by its area and by the largest distance of a vertex from the part's centre. Up to
+# it, the part is treated as enclosing no space. Offsets of ray origins, relative to the size of a surface,
+# are about as large.
 THINNEST = 1e-5
-# Largest distance of a boundary loop from its plane, divided by the square root of its area, up to which the
-# loop is flat. A part without a lid has a single boundary loop, which is flat.
+# Largest distance of a boundary loop from its plane, divided by the square root of the loop's area. Up to it,
+# the loop is flat. A part without a lid has a single boundary loop, which is flat.
 _FLAT = 0.1
-# Area of the missing lid divided by the area of the part, above which the part is a sheet, not a part without
-# a lid.
+# Area of the missing lid divided by the area of the part. Above it, the part is a sheet, not a part without a
+# lid.
 _WIDEST_LID = 0.9
-# Distance of two vertices of different objects along each axis, divided by the largest coordinate, up to
-# which they coincide.
+# Distance of two vertices of different objects along each axis, divided by the largest coordinate of all open
+# boundaries' parts. Up to it, the vertices coincide.
 _TOGETHER = 4e-7
 
 
@@ -40,11 +41,11 @@ class ClosedParts(NamedTuple):
     Attributes
     ----------
     part : (T,) int32
-        Part of each triangle, -1 for triangles that were left out. A wall between two touching boxes of one
-        object is left out as well.
+        Part of each triangle, -1 for triangles that were left out. The common wall of two touching boxes of
+        one object is left out as well.
     outward : (T,) int8
         1 if the triangle's normal points out of the space that its part encloses, -1 if it points into that
-        space, 0 if the part encloses no space. Parts without a lid are treated as closed.
+        space, 0 if the part encloses no space. Parts without a lid are treated as if they had one.
     closed : (P,) bool
         Whether the part encloses a space, with at most small holes.
     watertight : (P,) bool
@@ -68,20 +69,20 @@ class ClosedParts(NamedTuple):
 
 
 class _Pieces(NamedTuple):
-    """The P pieces that F faces form: sets of faces connected by edges.
+    """The P pieces of F faces: sets of faces connected by edges, from which parts are made.
 
     Attributes
     ----------
     piece : (F,) int32
         Piece of each face.
     turn : (F,) int8
-        -1 for faces that are reversed so that windings agree, else 1, see `_turns`.
+        -1 for faces that are reversed to make windings agree, else 1; see `_turns`.
     bad : (B,) int64
-        Boundary edges: after reversal, the numbers of half edges in both directions differ.
+        Boundary edges: edges whose numbers of half edges in the two directions differ after the reversal.
     edges : Edges
         Edges of the faces.
     holes, area : (P,) float64
-        Area of the holes of each piece and of its faces, m2.
+        For each piece, the area of its holes, and the area of its faces, m2.
     flat : (P,) bool
         Whether the piece has exactly one boundary loop, which is flat.
     """
@@ -189,7 +190,7 @@ def _weld(
 
 
 def _twins(vertex: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int8]]:
-    """Return for each face the first face with the same corners, and whether their windings agree.
+    """Return for each face the first face with the same corners, and whether the two windings agree.
 
     vertex : (F, 3) int64, welded vertices
     Returns (F,) int64, index of the first face; (F,) int8, 1 if the windings agree, -1 if they are opposite.
@@ -218,9 +219,9 @@ def _single(
 ) -> NDArray[np.int64]:
     """Return the indices of the faces that form pieces.
 
-    Of the faces with the same corners, only the first is used. If two boxes of one object touch, their common
-    wall occurs with both windings. It lies inside the union of the boxes and is left out. If all faces of a
-    piece occur with both windings, they are not left out.
+    If several faces have the same corners, only the first is used. If two boxes of one object touch, their
+    common wall occurs with both windings. The wall lies inside the union of the boxes and is left out. If all
+    faces of a piece occur with both windings, none of them is left out.
 
     vertex : (F, 3) int64; first : (F,) int64, same_winding : (F,) int8, see `_twins`
     """
@@ -270,11 +271,12 @@ def _loops(
     bad: NDArray[np.int64],
     balance: NDArray[np.int64],
 ) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.bool_]]:
-    """Return the boundary loops that boundary edges form. Edges that share a vertex are in the same loop.
+    """Find the loops that boundary edges form. Edges that share a vertex are in the same loop.
 
     vertex, corner : see `_pieces`; bad : (B,) int64, boundary edges
     balance : (B,) int64, `Edges.balance` of these edges after reversal of faces
-    Returns (B,) int32, loop of each edge; (L,) float64, area of each loop, m2; (L,) bool, whether it is flat.
+    Returns the loop of each edge, (B,) int32; the area of each loop, (L,) float64, m2; and whether each loop
+    is flat, (L,) bool.
     """
     name, ends = np.unique(np.stack([edges.low[bad], edges.high[bad]]), return_inverse=True)
     ends = ends.reshape(2, -1)
@@ -297,9 +299,10 @@ def _loops(
 def _turns(edges: Edges, piece: NDArray[np.int32], n_pieces: int) -> NDArray[np.int8]:
     """Return (F,) int8: -1 for faces to reverse, 1 for other faces.
 
-    After the reversal, windings agree across all edges that exactly two faces share.
-    A graph has two nodes for each face, one for each winding. Its edges connect windings of neighbouring
-    faces that agree. Faces of a one-sided surface (a Moebius strip) keep their windings.
+    After the reversal, windings agree across all edges that exactly two faces share. A graph has two nodes
+    for each face: one for its winding, and one for the reversed winding. If a winding of one face agrees with
+    a winding of its neighbour, a graph edge connects the two nodes. Faces of a one-sided surface (a Moebius
+    strip) keep their windings.
     """
     n = len(piece)
     turn = np.ones(n, np.int8)
@@ -363,8 +366,7 @@ def _join_objects(pieces: _Pieces, vertex: NDArray[np.int64], corner: NDArray[np
     turn[chosen[chosen_closes]] = again.turn[chosen_closes]
     name, number = np.unique(piece, return_inverse=True)
     holes = np.concatenate([pieces.holes, again.holes])[name]
-    # If a piece lost faces to a joined piece, its hole area is not updated. The former value is a lower
-    # limit.
+    # If a piece lost faces to a joined piece, its hole area and face area are not updated.
     area = np.concatenate([pieces.area, again.area])[name]
     flat = np.concatenate([pieces.flat, again.flat])[name]
     return pieces._replace(
@@ -389,9 +391,11 @@ def _near_alike(point: NDArray[np.float64], step: float) -> NDArray[np.int64]:
 
 
 def _enclosing(pieces: _Pieces, corner: NDArray[np.float64]) -> NDArray[np.int8]:
-    """Return (F,) int8: 1 if the normal of a face points out of the space its piece encloses, -1 if into it.
+    """Return (F,) int8: 1 if a face's normal points out of the space that its piece encloses, -1 if into it.
 
-    It is 0 for pieces that enclose no space. corner : (F, 3, 3) float64, positions of the corners, metres
+    It is 0 for pieces that enclose no space.
+
+    corner : (F, 3, 3) float64, positions of the corners, metres
     """
     n_pieces = len(pieces.area)
     centre = (

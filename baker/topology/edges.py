@@ -81,7 +81,7 @@ def find_edges(triangle: NDArray[np.int64]) -> Edges:
 def _stable_order(key: NDArray[np.int64], largest: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the order (N,) that sorts keys (N,) below `largest` stably, and the sorted keys.
 
-    Key and index are combined to one number and sorted, which is faster than a stable `argsort`.
+    If key and index fit into one number, these numbers are sorted, which is faster than a stable `argsort`.
     """
     n = len(key)
     if largest * max(n, 1) >= 2**63:

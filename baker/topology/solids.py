@@ -1,21 +1,30 @@
-"""Classifies closed parts as solids, whose inside is never visible, or rooms.
+"""Classifies parts as solids, whose inside is never visible, rooms, whose inside is visible, and covers.
 
-A part is a set of connected triangles, see `closed_parts`. Parts that let light through are ignored.
+A part is a set of connected triangles, see `topology.closed_parts`. Triangles that let light through are
+ignored.
 
-- A closed part whose normals mostly point outwards is a solid (a crate, a slab, a wall, a rock), with four
-  exceptions. It is a room if a light, a camera or an emitting part is inside. It is a room if it emits on
-  both sides and contains a part. It is a room if it has small holes and contains a part. It is a room if most
-  of the scene is inside (a sky sphere).
-- A closed part whose normals mostly point inwards and which lies in a solid is a hollow of that solid (a room
-  with thick walls). Other closed parts whose normals mostly point inwards are rooms if they emit, contain a
-  light, a camera or another part, or are the only part. Otherwise they are solids wound inwards.
-- An open part is a cover if a flat lid would close it, its normals point outwards, and no light, camera or
-other
-  part is inside (a crate without a bottom). A point all of whose rays hit the inside of a cover is hidden,
-  because another surface closes the opening.
+A closed part whose normals mostly point outwards (a crate, a slab, a wall, a rock) is a room if at least one
+of these conditions holds. Otherwise it is a solid.
 
-No light is inside a solid and none enters it. So the error is small if a room is classified as a solid:
-without light, the room is dark in any case.
+- A light, a camera or an emitting part is inside.
+- It emits on both sides, and another part is inside.
+- It has small holes, and another part is inside.
+- Most of the scene is inside (the part is a sky sphere).
+
+A closed part whose normals mostly point inwards is a hollow if it lies in a solid; the hollow is the inside
+of a room with thick walls, for example. Otherwise it is a room if at least one of these conditions holds. If
+none holds, it is a solid that is wound inwards.
+
+- It emits.
+- A light, a camera or another part is inside.
+- It is the only part.
+
+An open part is a cover (a crate without a bottom) if a flat lid would close it, it is double-sided, its
+normals point outwards, and no light, camera or other part is inside. If all rays of a point hit the inside of
+a cover, the point is hidden, because another surface closes the opening.
+
+No light is inside a solid, and none enters it. So if a room is classified as a solid by mistake, the error is
+small: without light, the room is dark in any case.
 """
 
 from __future__ import annotations
@@ -30,21 +39,22 @@ from baker.core.scene import Scene
 from baker.topology.closed_parts import ClosedParts, face_areas, find_closed_parts
 from baker.topology.winding_number import MANY, Enclosure
 
-# Values of `Solids.inside`: the triangle is not on a solid; the solid is at its back; the solid is at its
-# front.
+# Values of `Solids.inside`: NOWHERE if the triangle is not part of a solid, BEHIND if the inside of the solid
+# is at its back, BEFORE if the inside is at its front.
 NOWHERE, BEHIND, BEFORE = 0, 1, 2
 # Number of triangle centres of a part that are tested for being inside another part, see `_is_inside`.
 _WITNESSES = 8
-# Winding numbers. A point is inside a closed part above _INSIDE, inside a part without a lid above
-# _WITHOUT_LID, and outside of both below _OUTSIDE.
+# Winding numbers of a point. Above _INSIDE, the point is inside a closed part. Above _WITHOUT_LID, it is
+# inside a part without a lid. Below _OUTSIDE, it is outside of either.
 _INSIDE, _WITHOUT_LID, _OUTSIDE = 0.75, 0.5, 0.25
-# Share of the other parts' area: a part that contains more than it is a room.
+# Area of the parts inside a part, as a share of the area of all other parts. Above it, the part is a room.
 _MOST_OF_SCENE = 0.5
-# Number of parts with the largest boxes that are tested for containing most of the scene, and number of parts
-# in their boxes that are tested for being inside.
+# _LARGEST: number of parts, those with the largest bounding boxes, that are tested for containing most of the
+# scene.
+# _HELD: number of parts within such a box that are tested for being inside.
 _LARGEST, _HELD = 32, 64
-# Upper limit of faces of a part times number of parts tested for being inside it. It bounds the time; at
-# least _HELD parts are tested.
+# Number of faces of a part times number of parts that are tested for being inside it: upper limit, which
+# bounds the time. At least _HELD parts are tested.
 _MOST_WORK = 200_000_000
 
 
@@ -121,7 +131,7 @@ def lights_and_cameras(scene: Scene) -> NDArray[np.float64]:
 
 
 def find_solids(surfaces: SolidSurfaces, viewpoints: NDArray[np.float64]) -> Solids:
-    """Classify closed parts as solids, rooms and covers.
+    """Classify parts as solids, rooms and covers.
 
     Parameters
     ----------
@@ -173,13 +183,13 @@ class _Classifier:
         self.start = np.searchsorted(parts.part[self.order], np.arange(n + 1))
         weight = self._areas(in_part)
         area = np.maximum(parts.area, 1e-300)
-        # Compare with half of `ClosedParts.area`, which may lack slivers.
+        # Compare with half of `ClosedParts.area`, which is the area of the faces that form the part.
         self.inward = np.bincount(of, weight * (parts.outward[in_part] < 0), minlength=n) > 0.5 * area
         self.two_sided = np.bincount(of, weight * surfaces.double_sided[in_part], minlength=n) > 0.5 * area
         self.emits = np.bincount(of, surfaces.emits[in_part], minlength=n) > 0
         emits_behind = surfaces.emits & surfaces.double_sided
         self.emits_behind = np.bincount(of, emits_behind[in_part], minlength=n) > 0
-        # Tolerance for comparing boxes: rounding grows with the coordinates of a part.
+        # Set the tolerance for comparing boxes. It grows with the coordinates of a part, as rounding does.
         self.slack = 1e-6 * np.maximum(np.abs(parts.low), np.abs(parts.high)).max(axis=1, initial=0.0)
         self.around: dict[int, int] = {}
 
@@ -231,9 +241,12 @@ class _Classifier:
         return cover
 
     def _outward_room(self, part: int, large: bool) -> bool:
-        """Return whether a closed part with normals outwards is a room; large : whether `_largest` has it."""
-        # If the walls are double-sided, an emitter that is mostly inside makes a room, because the emitter
-        # may be set into the ceiling. With one-sided walls, it must be inside as a whole.
+        """Return whether a closed part with normals outwards is a room.
+
+        large : whether the part is in the result of `_largest`
+        """
+        # If the walls are double-sided, the part is a room if an emitter is mostly inside, because the
+        # emitter may be set into the ceiling. If they are one-sided, the whole emitter must be inside.
         mostly = bool(self.two_sided[part])
         if self._holds_viewpoint(part) or self._holds(part, self.emits, mostly=mostly):
             return True
@@ -248,7 +261,7 @@ class _Classifier:
         return self._holds_viewpoint(part) or self._holds(part, None, mostly=True)
 
     def _largest(self) -> set[int]:
-        """Return the `_LARGEST` closed parts with the largest bounding boxes and normals outwards."""
+        """Return those `_LARGEST` closed parts with normals outwards that have the largest bounding boxes."""
         parts = self.parts
         closed = np.flatnonzero(parts.closed & ~self.inward)
         size = np.prod(parts.high[closed] - parts.low[closed], axis=1)
@@ -279,7 +292,7 @@ class _Classifier:
     def _inside_from(self, part: int) -> float:
         """Return the winding number above which points are inside a part.
 
-        For a part without a lid it is 1/2, the winding number in the plane of the missing lid.
+        For a part without a lid, this number is 1/2, the winding number in the plane of the missing lid.
         """
         return _WITHOUT_LID if self.parts.lidless[part] else _INSIDE
 
@@ -294,7 +307,9 @@ class _Classifier:
     def _held_boxes(self, part: int, wanted: NDArray[np.bool_] | None, share: bool) -> NDArray[np.int64]:
         """Return the parts whose bounding boxes lie in the box of `part` or, with `share`, overlap it.
 
-        wanted : (P,) bool, parts to consider; None: all. Hollows of `part` are left out.
+        Hollows of `part` are left out.
+
+        wanted : (P,) bool, parts to consider; None means all
         """
         low, high = self.parts.low, self.parts.high
         if share:
@@ -310,7 +325,7 @@ class _Classifier:
     def _holds(self, part: int, wanted: NDArray[np.bool_] | None, *, mostly: bool = False) -> bool:
         """Return whether any other part is inside `part` or, with `mostly`, mostly inside.
 
-        wanted : (P,) bool, parts to consider; None: all
+        wanted : (P,) bool, parts to consider; None means all
         """
         held = self._held_boxes(part, wanted, mostly)
         if not len(held):
@@ -343,9 +358,9 @@ class _Classifier:
     def _is_inside(self, part: int, shell: int, surface: Enclosure, *, mostly: bool = False) -> bool:
         """Return whether `part` is inside `shell`, which it may touch.
 
-        `_WITNESSES` of its triangle centres are tested. At least half of them must be inside, and none
-        outside. With `mostly`, it is sufficient that more than half are inside. If the part emits, `mostly`
-        tests only its emitting triangles.
+        Up to `_WITNESSES` triangle centres of `part` are tested. At least half of them must be inside, and
+        none outside. With `mostly`, it is sufficient that more than half are inside, and if `part` emits,
+        only its emitting triangles are tested.
 
         surface : faces of `shell`
         """

@@ -1,4 +1,4 @@
-"""Finds triangles that must not be baked: with unusable vertices, without area, or duplicated."""
+"""Finds triangles that must not be baked: unusable vertices, no area, or duplicates."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from baker.topology.unique_rows import mix, unique_rows
 
 # Largest absolute coordinate of a usable vertex. The limit of Embree is 1.8e18.
 LARGEST_COORDINATE = 1e18
-# Height of a triangle divided by its longest edge, up to which it has no area. It is about the spacing of
-# float32: the plane of such a triangle is undefined.
+# Height of a triangle divided by its longest edge. Up to it, the triangle is treated as having no area. It is
+# about the relative spacing of float32 numbers, so the plane of such a triangle is undefined.
 _FLATTEST = 1e-7
 
 
 def in_range(
     triangle: NDArray[np.int64], low: NDArray[np.int64], high: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
-    """Return which triangles have all vertex indices in their range.
+    """Return which triangles have only vertex indices within the triangle's range.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def usable_vertices(position: NDArray[np.float32]) -> NDArray[np.bool_]:
 
 
 def zero_area(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return which triangles have no area: their corners are in one point or on one line.
+    """Return which triangles have no area, because their corners are at one point or on one line.
 
     Parameters
     ----------
@@ -117,9 +117,10 @@ def duplicates(
 ) -> NDArray[np.bool_]:
     """Return which triangles are duplicates of an earlier triangle, by position.
 
-    A triangle is a duplicate if an earlier one has the same three corner positions and the same winding, no
-    matter at which corner it starts. A triangle with the opposite winding is the back of the earlier one. It
-    is a duplicate only if both have the same material and that is double-sided.
+    A triangle is a duplicate if an earlier triangle has the same three corner positions and the same winding;
+    they may start at different corners. If an earlier triangle has the same positions and the opposite
+    winding, the triangle is a duplicate only if both have the same material and this material is
+    double-sided.
 
     Parameters
     ----------
@@ -150,8 +151,8 @@ def duplicates(
     winding = b > c
     low, high = np.minimum(b, c), np.maximum(b, c)
 
-    # Sort by corners, winding, then index. All but the first triangle of each run of equal corners and
-    # winding are duplicates.
+    # Sort by corners, then winding, then index. In each run of equal corners and winding, all but the first
+    # triangle are duplicates.
     order = np.lexsort((candidate, winding, high, low, a))
     face = np.stack([a, low, high], axis=1)[order]
     wound = winding[order]
@@ -161,8 +162,8 @@ def duplicates(
     same[1:] &= wound[1:] == wound[:-1]
     repeated[candidate[order[same]]] = True
 
-    # Of the triangles with the same corners, at most one of each winding is left. With a double-sided
-    # material, the later one is a duplicate.
+    # For each set of corners, at most one triangle of each winding is left. If both have one double-sided
+    # material, the later triangle is a duplicate.
     left, left_face = order[~same], face[~same]
     pair = np.flatnonzero((left_face[1:] == left_face[:-1]).all(axis=1))
     one, two = candidate[left[pair]], candidate[left[pair + 1]]

@@ -1,4 +1,4 @@
-"""Finds rows of arrays that are equal bit by bit.
+"""Finds rows of arrays that are equal bit for bit.
 
 Rows are compared by a 64-bit hash first, which is fast for millions of rows. Rows with equal hashes are then
 compared in full, so that different rows are never merged.
@@ -20,7 +20,7 @@ def first_equal(column: Sequence[NDArray[np.generic]], n_rows: int) -> NDArray[n
     column : sequence of (N, any) arrays
         Two rows are equal if they are equal in every array.
     n_rows : int
-        N. It is needed if `column` is empty; all rows are then equal.
+        N, which cannot be derived from `column` if that is empty; all rows are then equal.
 
     Returns
     -------
@@ -47,7 +47,7 @@ def first_equal(column: Sequence[NDArray[np.generic]], n_rows: int) -> NDArray[n
 def unique_rows(
     column: Sequence[NDArray[np.generic]], n_rows: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the indices of the K distinct rows, and for each row its number among them.
+    """Return the first index of each of the K distinct rows, and for each row the number of its distinct row.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def _words(array: NDArray[np.generic]) -> NDArray[np.uint64]:
 
 
 def mix(value: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """Return a hash (N,) of each number (N,). Changing one bit of a number changes about half the bits."""
+    """Return a hash (N,) of each number (N,). One changed bit of a number changes about half of the hash."""
     # Based on: Sebastiano Vigna, SplitMix64's finaliser, 2015.
     value = value + np.uint64(0x9E3779B97F4A7C15)
     value = (value ^ (value >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)

@@ -24,9 +24,9 @@ _BUFFER_INDEX, _BUFFER_VERTEX = 0, 1
 _FORMAT_UINT3, _FORMAT_FLOAT3 = 0x5003, 0x9003
 _PROPERTY_VERSION, _PROPERTY_RAY4, _PROPERTY_RAY8, _PROPERTY_RAY16 = 0, 32, 33, 34
 _SCENE_ROBUST = 1 << 2
-# Number of triangles up to which packets are traced as coherent, because rays of neighbouring texels then hit
-# the same triangles. Measured: final gather of one 512 x 512 page with 64 rays per texel, time with coherent
-# packets divided by time with incoherent ones:
+# Number of triangles of the scene. Up to it, packets are traced as coherent, because rays of neighbouring
+# texels usually hit the same triangles. The table shows the time of a final gather (one page of 512 x 512
+# texels, 64 rays per texel) with coherent packets, divided by the time with incoherent packets:
 #
 #     triangles   36     446    986    2714   11,000        70,000
 #     time        0.79   0.81   0.77   0.74   0.93 to 1.2   1.35
@@ -116,7 +116,7 @@ class Tracer(NamedTuple):
     blend_scene : int or None
         Address of the RTCScene of the BLEND triangles that let light through; None without such triangles.
     coherent : bool
-        Whether packets are traced as coherent: the scene has at most `MAX_COHERENT_TRIANGLES` triangles.
+        Whether packets are traced as coherent, which is so up to `MAX_COHERENT_TRIANGLES` triangles.
     coloured : bool
         Whether any triangle of `blend_scene` colours the light that passes through it.
     """
@@ -171,8 +171,8 @@ class RayScene:
     triangle : (T, 3) uint32 or int32
         Indices of the triangles' vertices.
     robust : bool
-        Embree's ROBUST flag. With it, no ray leaks through a shared edge. Of rays aimed exactly at a vertex,
-        0.7 % leak with the flag and 17 % without it.
+        Embree's ROBUST flag. With it, no ray leaks through a shared edge. If rays are aimed exactly at a
+        vertex, 0.7 % of them leak with the flag, and 17 % without it.
     threads : int
         Number of threads that build the tree; 0 means all.
     hit_filter : HitFilter, optional
@@ -201,8 +201,10 @@ class RayScene:
         self._library = library
         self._owners = hit_filter, blend_filter
         n = len(position)
-        # With filters, vertex n is NaN. Triangles that are not in a geometry have it as all their vertices,
-        # so that Embree skips them. The last row is padding, because Embree reads 16 bytes at each vertex.
+        # Every geometry contains all T triangles, so that `primID` is the same in each. With filters, vertex
+        # n is NaN. All three vertices of a triangle that does not belong to a geometry are vertex n there, so
+        # that Embree skips the triangle. The last row is padding, because Embree reads 16 bytes at each
+        # vertex.
         self._position = np.zeros((n + (1 if hit_filter is None else 2), 3), np.float32)
         self._position[:n] = position
         whole = np.ascontiguousarray(triangle, np.uint32)

@@ -1,13 +1,14 @@
 """Decorators and primitives of kernels, chosen for short compile times.
 
-The first bake after an install compiles all kernels that it uses. Compile times measured with Numba 0.68:
+The first bake after an install compiles all kernels that it uses. These decorators and primitives avoid the
+following compile times, which were measured with Numba 0.68:
 
-- A wrapper that makes a function callable from Python takes 40 ms. A `kernel` has a wrapper, an `inner`
-  function has none.
+- A wrapper that makes a function callable from Python takes 40 ms. Only `kernel` functions have a wrapper;
+  `inner` functions have none.
 - Kernels and inner functions are compiled without reference counts, because Python owns all their arrays.
 - `np.zeros` compiles three functions in 0.2 s. `scratch` compiles none.
-- `min` and `max` compile a function for each combination of types in 40 ms. `smaller` and `larger` compile
-  to a comparison and a selection.
+- `min` and `max` compile a function for each combination of types, in 40 ms each. `smaller` and `larger`
+  compile to a comparison and a selection.
 """
 
 from __future__ import annotations
@@ -104,7 +105,7 @@ def _choice(comparison: str) -> Any:
     return intrinsic(choose)
 
 
-# Functions for kernels that return the smaller and the larger of two numbers; the first number if either is
-# NaN.
+# Functions for kernels that return the smaller and the larger of two numbers. If either is NaN, they return
+# the first number.
 smaller = _choice("<")
 larger = _choice(">")

@@ -1,12 +1,12 @@
 """Deletes outdated cached kernels, and allows kernels without a cache folder.
 
 Numba compiles a cached kernel again only if the file of the kernel has changed. The functions compiled into
-the kernel may be in other files. If only those change, Numba runs outdated code. So importing a package with
-kernels deletes all cache files that are older than a source file they may depend on.
+the kernel may be in other files. If only these files change, Numba runs outdated code. Therefore, importing a
+package with kernels deletes the cache files that are older than any source file they may depend on.
 
-Numba also raises an error for a function with `cache=True` if no cache folder is writable, for example in a
-read-only install. In that case `allow_no_cache` replaces a method of Numba's dispatcher classes. The kernels
-of this program are then compiled in memory, in every process.
+If no cache folder is writable, for example in a read-only install, Numba raises an error for functions with
+`cache=True`. In that case, `allow_no_cache` replaces a method of Numba's classes of compiled functions, and
+every process compiles the kernels in memory.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def drop_stale(folder: Path, made_of: list[Path]) -> None:
     newest = max((file.stat().st_mtime for part in made_of for file in part.glob("*.py")), default=0.0)
     if newest > time.time():
         # A source file has a time in the future, because a clock was wrong. Every cached kernel is older than
-        # it and would be deleted in each run.
+        # this file and would be deleted in each run.
         return
     for index in folder.glob("__pycache__/*.nbi"):
         # Ignore the error if another process has deleted the file, or if the folder is read-only.

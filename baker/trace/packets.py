@@ -4,9 +4,10 @@ A packet of N rays is an array of 21 rows of N four-byte numbers: 12 rows for th
 hits, laid out as RTCRayHitN. Lane i is column i, which holds ray i. Kernels call Embree through integer
 addresses, because Numba cannot cache kernels that call ctypes objects.
 
-The kernels of a bake trace PACKET_WIDTH rays at a time, whatever width the processor traces natively
-(`trace_lanes`). The rows of a packet are then at constant offsets, so that the compiler vectorises loops over
-lanes. Generating a cosine-weighted ray takes 3.5 ns with a constant width, and 28 ns with a variable one.
+The kernels of a bake process PACKET_WIDTH rays at a time. If the processor traces narrower packets natively,
+`trace_lanes` splits the packet. With a constant width, the rows of a packet are at constant offsets, so the
+compiler vectorises loops over lanes. Generating a cosine-weighted ray takes 3.5 ns with a constant width, and
+28 ns with a variable width.
 
 Based on: Embree 4 API reference, RTCRayHitN.
 """
@@ -29,7 +30,7 @@ ORG_X, ORG_Y, ORG_Z, TNEAR, DIR_X, DIR_Y, DIR_Z, TIME, TFAR, MASK, ID, FLAGS = r
 NG_X, NG_Y, NG_Z, HIT_U, HIT_V, PRIM_ID, GEOM_ID = range(12, 19)
 ROWS = 21
 MAX_WIDTH = 16
-# Number of rays that the kernels of a bake trace together.
+# Number of rays that the kernels of a bake process together.
 PACKET_WIDTH = 16
 NO_HIT = np.uint32(0xFFFFFFFF)
 # Fields of RTCFilterFunctionNArguments, in units of 8 bytes. FILTER_WIDTH is a field of 4 bytes.
@@ -47,8 +48,9 @@ BLEND_GEOMETRY = np.uint32(2)
 #     scene of BLEND triangles   n = 1 to 16   the ray passes, t is multiplied by lerp(1, c, a)
 #                                PASSES + n    the ray passes, t is multiplied by T
 PASSES, UNAWARE, SOLID = PACKET_WIDTH, np.uint32(2 * PACKET_WIDTH + 1), np.uint32(2 * PACKET_WIDTH + 2)
-# Memory at the address of the query context, which filter functions of BLEND triangles read. Offsets in
-# four-byte words: first RTCRayQueryContext, then `BlendBuffers.stop`, `.transmittance` and `.edges`, then
+# Layout of the memory at the address of the query context, which filter functions of BLEND triangles read.
+# Offsets are in four-byte words. RTCRayQueryContext comes first, then `BlendBuffers.stop`, `.transmittance`
+# and `.edges`, then
 # EDGE_HITS pairs for each ray. A pair is the distance and the surface of a hit on an edge.
 EDGE_HITS = 32
 BLEND_STOP, BLEND_TRANSMITTANCE, BLEND_EDGES = 16, 16 + PACKET_WIDTH, 16 + 4 * PACKET_WIDTH
@@ -61,7 +63,8 @@ _COHERENT = 1 << 16
 def _call(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
     """Emit a call of `void f(int* valid, RTCScene, RTCRayN*, RTCArguments*)`.
 
-    args : address of f, `valid`, scene, packet and, optionally, the arguments; NULL is passed without them
+    args : address of f, `valid`, scene, packet and, optionally, the RTCArguments; without these, NULL is
+        passed
     kinds : Numba types of `args`
     """
     byte_pointer = ir.IntType(8).as_pointer()
@@ -95,7 +98,10 @@ call_embree: Any = intrinsic(_call_embree)
 
 
 def _call_embree_with(typing_context, address, valid, scene, ray, arguments):  # type: ignore[no-untyped-def]
-    """Call rtcIntersectN or rtcOccludedN as `call_embree`, with `arguments` (5,) int64 of `arguments_of`."""
+    """Call rtcIntersectN or rtcOccludedN for a packet, with `arguments` (5,) int64, from `arguments_of`.
+
+    The other arguments are those of `_call_embree`.
+    """
     signature = types.void(types.int64, valid, types.int64, ray, arguments)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -139,8 +145,8 @@ class BlendBuffers(NamedTuple):
     coloured : int
         0 if no triangle of `scene` colours light.
     arguments : (5,) int64
-        RTCOccludedArguments. The arrays below follow its query context in memory, so that filter functions
-        can access them.
+        RTCOccludedArguments. In memory, the arrays below follow the query context of these arguments, so that
+        filter functions can access the arrays.
     stop : (16,) uint32
         Triangle at which each ray ends. This triangle does not change the transmittance.
     transmittance : (3 * 16,) float32
@@ -171,9 +177,9 @@ class PacketBuffers(NamedTuple):
     lane_valid, lane_floats, lane_words : ndarray
         `valid`, `floats` and `words` of a packet of PACKET_WIDTH rays.
     query : (5,) int64
-        `arguments_of` packets of this scene, coherent if `Tracer.coherent`.
+        From `arguments_of`, with the coherent flag if `Tracer.coherent` is true.
     blend : BlendBuffers or None
-        None without BLEND triangles; Numba then compiles kernels without transmittance.
+        None without BLEND triangles; Numba then compiles kernels without the code for transmittance.
     """
 
     scene: int
@@ -239,8 +245,8 @@ def new_blend_buffers(scene: int, coloured: bool) -> BlendBuffers:
     memory = aligned_floats(CONTEXT_WORDS)
     words = memory.view(np.uint32)
     words[:BLEND_STOP] = NO_HIT
-    # Do not set the coherent flag. With it, Embree traverses the rays of each octant separately, but calls
-    # the filter for all rays of the packet at each leaf.
+    # Do not set the coherent flag. With the flag, Embree traverses the rays of each octant of directions
+    # separately, but calls the filter for all rays of the packet at each leaf.
     arguments = arguments_of()
     arguments[1] = memory.ctypes.data
     stop, edges = words[BLEND_STOP:BLEND_TRANSMITTANCE], words[BLEND_EDGES:BLEND_EDGE_HITS]
@@ -321,7 +327,7 @@ def trace(function, scene, valid, floats):  # type: ignore[no-untyped-def]
 
 @inner
 def trace_lanes(function, scene, width, query, lane_valid, lane_floats, valid, floats):  # type: ignore[no-untyped-def]
-    """Trace up to sixteen rays, those with `lane_valid` -1, in packets of the native width.
+    """Trace the rays of sixteen lanes whose `lane_valid` is -1, in packets of the native width.
 
     function : address of `intersect` or `occluded`; scene, width, query : see `PacketBuffers`
     lane_valid : (16,) int32; lane_floats : (21 * 16,) float32, packet of the sixteen rays and their hits
@@ -330,8 +336,8 @@ def trace_lanes(function, scene, width, query, lane_valid, lane_floats, valid, f
     if width == PACKET_WIDTH:
         call_embree_with(function, lane_valid, scene, lane_floats, query)
         return
-    # Copy four lanes at a time with `copy_four`, for which the compiler generates less code than for loops
-    # over lanes.
+    # Copy four lanes at a time with `copy_four`, because the compiler generates less code for it than for
+    # loops over lanes.
     for first in range(0, PACKET_WIDTH, width):
         lane = first
         while lane < first + width and lane_valid[lane] == 0:

@@ -4,12 +4,9 @@
     E = 1/n sum L cos / (p_light + (n_hemisphere / n) p_cosine)
 
 The sum is over the n shadow rays, with the radiance L of the emitter and the cosine at the texel. p are
-probability
-densities per steradian. The balance heuristic combines these light samples with n_hemisphere rays that hit
-the
-same emitters (`emitter_hit`). If no shadow ray of sixteen neighbouring texels is blocked and the emitters are
-few,
-untextured and opaque, the closed form of `radiosity.kernels.polygon_light` replaces both.
+probability densities per steradian. The balance heuristic combines these light samples with n_hemisphere rays
+that hit the same emitters (`emitter_hit`). If no shadow ray of sixteen neighbouring texels is blocked and the
+emitters are few, untextured and opaque, the closed form of `radiosity.kernels.polygon_light` replaces both.
 
 Based on: Veach and Guibas, Optimally combining sampling techniques, 1995.
 """
@@ -50,12 +47,10 @@ _SHORT = np.float32(0.9999)
 # Number of samples per texel and emitter. Below it, the closed form is not used.
 _SAMPLES_PER_EMITTER = 8
 # Early out (see `light_samples`): smallest mean number of test rays per texel. With fewer test rays, texels
-# are
-# not treated as unoccluded.
+# are not treated as unoccluded.
 _MIN_TESTS = 8
 # Rows of `sampled`, the data of the emitter that each lane samples: corner 0, edges 1 and 2 and normal (3
-# each),
-# probability density per m2, 1 if two-sided else 0, radiance (3).
+# each), probability density per m2, 1 if two-sided else 0, radiance (3).
 _CORNER, _EDGE_1, _EDGE_2, _NORMAL, _DENSITY, _TWO_SIDED, _RADIANCE = 0, 3, 6, 9, 12, 13, 14
 _SAMPLED_ROWS = 17
 # Working memory of `light_samples`.
@@ -228,8 +223,8 @@ def light_samples(
     any_alpha = False
     if shading is not None:
         any_alpha = len(shading.alpha.slot) > 0
-    # Allow the closed form if emitters are few (see `_SAMPLES_PER_EMITTER`), untextured and opaque.
-    # Whether occluders have alpha is found by the early-out tests.
+    # Allow the closed form if emitters are few (see `_SAMPLES_PER_EMITTER`), untextured and opaque. Whether
+    # occluders have alpha is found by the early-out tests.
     untextured = len(row) * _SAMPLES_PER_EMITTER <= n_samples
     for m in range(len(row) if untextured else 0):
         untextured = untextured and row[m, TEXTURED] == _f(0.0)

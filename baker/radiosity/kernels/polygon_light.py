@@ -4,12 +4,9 @@
     E = L / 2 |sum_i angle_i Gamma_i . n|
 
 The triangle is clipped to the half space above the tangent plane of the receiving point. The sum is over the
-edges i
-of the clipped polygon. n is the unit normal at the point, and L the radiance. angle_i is the angle that edge
-i subtends
-at the point. Gamma_i is the unit normal of the plane through the point and the edge. If a and b are the
-vectors from
-the point to the edge's ends,
+edges i of the clipped polygon. n is the unit normal at the point, and L the radiance. angle_i is the angle
+that edge i subtends at the point. Gamma_i is the unit normal of the plane through the point and the edge. If
+a and b are the vectors from the point to the edge's ends,
 
     angle Gamma = angle / sin(angle) (a x b) / (|a| |b|)
 
@@ -41,8 +38,7 @@ _ORIGIN, _NORMAL, _ARM, _HEIGHT, _SUM, _SMALL, _FACING = 0, 3, 6, 18, 21, 22, 23
 _ROWS = 24
 _work, _corners = scratch((_ROWS * PACKET_WIDTH,), _f), scratch((15,), _f)
 # (longest edge / distance)^2 of a triangle. Below it, the triangle is treated as a point at its centroid,
-# because the
-# sum over edges would lose digits. The relative error of this approximation is about 1e-5.
+# because the sum over edges would lose digits. The relative error of this approximation is about 1e-5.
 _SMALL_VIEW = np.float32(1.0e-4)
 
 

@@ -3,8 +3,7 @@
 
 Another surface divides a split texel into sides, and each of the texel's 16 points lies on one side
 (`radiosity.sides`). A hit gets the side of the nearest point that is visible from a position on the ray
-shortly
-before the hit. If no point is visible from there, visibility is tested from just above the hit.
+shortly before the hit. If no point is visible from there, visibility is tested from just above the hit.
 `radiosity.kernels.sides` defines the height of the segments that test visibility.
 """
 

@@ -2,18 +2,15 @@
 """Texels with points on both sides of another surface that passes through them.
 
 For example, a floor that continues under a wall has texels with points on both sides of the wall. Two points
-of a
-texel are on the same side if a segment between them is not blocked. The ends of the segment are raised along
-the
-normals of the points by
+of a texel are on the same side if a segment between them is not blocked. The ends of the segment are raised
+along the normals of the points by
 
     height = min(HIGH s, headroom / 2)        s: side of the texel, metres
 
 The headroom of a point is the free distance along its normal. Both ends are raised by the smaller of the two
-points'
-heights. So a step lower than that height does not separate two points, and an opening lower than that height
-does not
-connect them. The same test finds the side on which a ray's hit lies (`radiosity.kernels.side_table`).
+points' heights. So a step lower than that height does not separate two points, and an opening lower than that
+height does not connect them. The same test finds the side on which a ray's hit lies
+(`radiosity.kernels.side_table`).
 """
 
 from __future__ import annotations
@@ -45,8 +42,7 @@ _f = np.float32
 # Heights of segments above the surface, in texel sides. Segments between points are at most at HIGH.
 HIGH, LOW = 0.25, 0.02
 # Half length of the test segments along the diagonals, as a share of the texel's diagonal. More than 0.5, so
-# that a
-# surface exactly between two texels is found in both.
+# that a surface exactly between two texels is found in both.
 _HALF_DIAGONAL = 0.55
 # Distance of a tested corner from the mean of the polygon's corners, as a share of the true corner's
 # distance.

@@ -2,8 +2,7 @@
 """Conservative rasterisation of charts: finds the triangles that touch each texel's square.
 
 A first pass counts the triangles of each texel. A second pass writes the triangles, with their areas inside
-the
-texel's square. Then each texel keeps the triangles of one chart: the chart with the largest area in the
+the texel's square. Then each texel keeps the triangles of one chart: the chart with the largest area in the
 texel.
 """
 

@@ -10,8 +10,8 @@ and colour c, the ID of the ray decides:
 - Rays that pass BLEND surfaces (ID `packets.UNAWARE`): the hit is accepted only if a is 1.
 - Rays between points of a texel (ID `packets.SOLID`): the hit is accepted if a is above 0.
 - Other rays (ID 0): the hit is accepted with probability a. The random number is a hash of the bits of the
-  ray and of the triangle. So a ray has the same result in any packet and on any thread. Decisions at
-  different surfaces, and of different rays, are independent.
+  ray and of the triangle's number. So a ray has the same result in any packet and on any thread. Decisions
+  for different surfaces or different rays are independent.
 
 Based on: Enderton et al., Stochastic transparency, 2010; Embree 4 API reference, RTCFilterFunctionN.
 """
@@ -52,10 +52,10 @@ from baker.trace.packets import (
 from baker.trace.pointers import pointer
 
 _INV_2_32 = 1.0 / 4294967296.0
-# Indices in the user data of the filter, which holds address and length of each array.
+# Indices in the user data of the filter, which contains address and length of each array.
 _ALPHA_SLOT, _ALPHA_ROW, _PIXELS, _CODED, _LEVEL, _N_LEVELS, _WRAP, _BLEND_SLOT, _BLEND_ROW = range(0, 18, 2)
 _U, _V, _PRIM = HIT_U - NG_X, HIT_V - NG_X, PRIM_ID - NG_X
-# Transmittance (largest of R, G and B) below which a shadow ray is blocked.
+# Transmittance (largest of R, G and B) along a shadow ray. Below it, the ray is treated as blocked.
 _DARK = np.float32(1.0e-9)
 _rgba, _rgb = scratch((4,), np.float64), scratch((3,), np.float64)
 
@@ -87,9 +87,9 @@ def _hash_ray(bits, ray, n, lane):
 def _surface_bits(surface, ray, hit, n, lane):
     """Return a uint32 hash of a surface and of the side from which a ray hits it.
 
-    It replaces the triangle's number if the ray crosses an edge, so that the decision is the same for all
-    triangles at the edge. The side is included because a ray crosses a closed surface twice, from outside and
-    from inside.
+    If the ray crosses an edge, this hash replaces the hash of the triangle's number. So the decision is the
+    same for all triangles at the edge. The side is included, because a ray crosses a closed surface from
+    outside and from inside, and the two decisions must be independent.
 
     surface : float32, `AlphaTable` column SURFACE
     ray, hit : (12 * n,) and (6 * n,) float32, arrays that Embree passes; n : packet width
@@ -145,7 +145,7 @@ def _let_through(arguments):
             continue
         if ray_words[ID * n + lane] == SOLID:
             continue
-        # For a ray to its first hit, accept with probability alpha.
+        # For a ray that is traced to its first hit, accept the hit with probability alpha.
         number = np.int64(ray_words[ID * n + lane]) - 1
         if number < 0:
             bits = hash_u32(prim)

@@ -1,11 +1,11 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Merges the hits of a ray on an edge that triangles share, so that the surface is crossed only once.
+"""Merges hits of a ray on an edge that triangles share, so that they are one crossing of the surface.
 
 With Embree's ROBUST flag, no ray passes between two adjacent triangles. But if a ray meets their common edge
-to within rounding, hits on both triangles are reported; at a vertex, hits on all triangles around it. Such
-hits are rare, so the edge hits of each ray are stored and compared with later ones. Two different surfaces at
-the same position are crossed separately. Only hits on triangles of one connected surface (`alpha.SURFACE`)
-are merged.
+to within rounding, Embree reports hits on both triangles. At a vertex, it reports hits on all triangles
+around the vertex. Such hits are rare, so the edge hits of each ray are stored and compared with later edge
+hits. Only hits on triangles of one connected surface (`kernels.alpha.SURFACE`) are merged, because two
+different surfaces at the same position must be crossed separately.
 
 Based on: Woop, Benthin and Wald, Watertight ray/triangle intersection, 2013.
 """
@@ -17,10 +17,11 @@ import numpy as np
 from baker.trace.jit import inner
 from baker.trace.packets import BLEND_EDGE_HITS, BLEND_EDGES, EDGE_HITS
 
-# Barycentric coordinate up to which a hit lies on an edge. Embree accepts coordinates down to -1.2e-7, so
-# both triangles at an edge are hit only within 1.2e-7 of it.
+# Smallest barycentric coordinate of a hit. Up to it, the hit is treated as lying on an edge. Embree accepts
+# coordinates down to -1.2e-7, so a ray hits both triangles at an edge only within 1.2e-7 of the edge.
 EDGE = 1.0e-6
-# Largest relative difference of the distances of two hits at the same crossing, which rounding causes.
+# Relative difference of the distances of two hits. Up to it, the hits are the same crossing: rounding causes
+# the difference.
 SAME = np.float32(4.0e-6)
 
 
@@ -32,10 +33,10 @@ def on_edge(b1, b2):
 
 @inner
 def crossed_before(context, words, number, surface, distance):
-    """Return whether ray `number` already hit an edge of the surface at this distance; if not, store the hit.
+    """Return whether ray `number` has already hit an edge of the surface at this distance; store new hits.
 
     context, words : (CONTEXT_WORDS,) float32 and uint32 views of the same memory, see `packets`
-    surface : float32, number of the surface (`alpha.SURFACE`)
+    surface : float32, number of the surface (`kernels.alpha.SURFACE`)
     distance : float32, distance of the hit in units of the direction's length
     """
     first = BLEND_EDGE_HITS + number * (2 * EDGE_HITS)

@@ -1,10 +1,10 @@
 # mypy: disable-error-code="no-untyped-def"
 """The filter function of the tree of BLEND triangles, which multiplies transmittance and rejects every hit.
 
-The ID of a ray is its number, 1 to 16, or PASSES plus its number (`packets.PASSES`). For a ray without
-PASSES, the transmittance is multiplied by lerp(1, c, a), with alpha a and colour c of the surface. With
-PASSES it is multiplied by (1 - a) lerp(1, c, a). The transmittance is stored after the query context
-(`packets.BlendBuffers`).
+The ID of a ray is its number, 1 to 16, or PASSES plus its number (`trace.packets.PASSES`). If the ID is the
+number, the transmittance is multiplied by lerp(1, c, a), with alpha a and colour c of the surface. If the ID
+is PASSES plus the number, the transmittance is multiplied by (1 - a) lerp(1, c, a). In memory, the
+transmittance is stored after the query context (`trace.packets.BlendBuffers`).
 
 Based on: Embree 4 API reference, RTCFilterFunctionN and RTCRayQueryContext.
 """
@@ -42,7 +42,7 @@ from baker.trace.packets import (
 from baker.trace.pointers import pointer
 
 _U, _V, _PRIM = HIT_U - NG_X, HIT_V - NG_X, PRIM_ID - NG_X
-# Indices in the user data of the filter, which holds address and length of each array.
+# Indices in the user data of the filter, which contains address and length of each array.
 _SLOT, _ROW, _PIXELS, _CODED, _LEVEL, _N_LEVELS, _WRAP = range(0, 14, 2)
 _rgba, _rgb = scratch((4,), np.float64), scratch((3,), np.float64)
 
