@@ -91,8 +91,8 @@ def other_option(model, name):
     raise AssertionError(f"no known value is accepted by {name}")
 
 
-# {setting: (text, value)} with a value other than the default. A missing setting fails the test below; those
-# of encodings are added, so that an encoding is a single file.
+# {setting: (text of its flag, value)}: for each setting a value other than the default. A test below fails if
+# a setting is missing. `other_option` adds the options of encodings, so a new encoding needs no line here.
 OTHER = {
     "allow_outside": (None, True),
     "channels": ("ao", ("ao",)),
@@ -344,7 +344,7 @@ def test_the_help_of_a_command_fits_80_columns_and_breaks_no_name(name, command,
     assert command(name, "--help-all")[0] == 0
     text = capsys.readouterr().out
     assert max(map(len, text.splitlines())) <= 80
-    # No type names of Python or typer, and no placeholder that says nothing.
+    # The help contains no type names of Python or typer, such as <int>, and no TEXT, X or braces.
     assert not re.search(r"<\w+>|\bTEXT\b|\bX\b|\{", text)
     made = getattr(importlib.import_module(f"baker.cli.{name}"), name)()
     words = set(re.split(r"[\s,()]+", text))
@@ -352,7 +352,7 @@ def test_the_help_of_a_command_fits_80_columns_and_breaks_no_name(name, command,
         if option.param_type_name == "option":
             assert {*option.opts, *option.secondary_opts} <= words
             assert option.is_flag or option.count or f" {option.metavar}" in text, option.metavar
-    # Two columns: a description begins where all of its group begin.
+    # All descriptions of a group of options begin in the same column.
     for group in text.split("\n\n"):
         rows = [line for line in group.splitlines() if re.match(r"  -\S.* {2,}\S", line)]
         assert len({re.match(r"  \S+( \S+)* {2,}", row).end() for row in rows}) <= 1

@@ -156,7 +156,8 @@ def test_the_commands_of_the_image(tmp_path):
     install, times, warm = (rest for word, rest in dockerfile() if word == "RUN")
     assert re.fullmatch(r"pip install .* --no-compile /src", install)
 
-    # Numba and Python compare the time of a source file with the one that they stored.
+    # Numba and Python store the modification times of source files with compiled code, to detect changes.
+    # Therefore the image sets these times to a fixed value.
     (tmp_path / "baker").mkdir()
     (tmp_path / "baker" / "a.py").write_text("x = 1\n")
     code, said = run(tmp_path, "sh", "-ec", re.sub(r'^cd ".*?" &&', "", times))
@@ -164,7 +165,7 @@ def test_the_commands_of_the_image(tmp_path):
     assert (tmp_path / "baker" / "a.py").stat().st_mtime == 1577836800.0
     assert len(list((tmp_path / "baker" / "__pycache__").iterdir())) == 1
 
-    # The kernels of the tests are used, so the folder of Numba stays as it is.
+    # NUMBA_CACHE_DIR is not set here, so the bake uses the kernels that other tests compiled.
     for old, new in (
         ("interior", "cornell"),
         ("/src", str(ROOT)),

@@ -1,4 +1,4 @@
-"""Text of files reaches no terminal and no report with control characters in it."""
+"""Control characters in texts of files are escaped in terminal output and in reports."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ODD = "\x1b[31mred\x07\x9b\u202e\u2028\ud800\x00\x7f\ufffe"
 
 
 def is_clean(text: str) -> bool:
-    """Return whether a text has no control characters but line feeds."""
+    """Return whether a text has no control characters except line feeds."""
     return printable_lines(text) == text
 
 

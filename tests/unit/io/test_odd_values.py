@@ -1,4 +1,4 @@
-"""Values that are valid JSON or TOML and yet fit nowhere: each gives a sentence, none an internal error."""
+"""Unusual values in valid JSON or TOML are accepted, or refused with one sentence."""
 
 from __future__ import annotations
 

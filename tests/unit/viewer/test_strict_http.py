@@ -1,4 +1,4 @@
-"""Requests that can be understood in two ways are refused, and nothing after them is answered."""
+"""The viewer's server refuses ambiguous HTTP requests, and does not answer requests after them."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def server() -> Iterator[ViewServer]:
 
 
 def answer(server: ViewServer, request: bytes) -> bytes:
-    """Return all that the server sends for a request and the one after it."""
+    """Return everything that the server sends for the bytes `request`, which may have several requests."""
     host = f"127.0.0.1:{server.server_port}".encode()
     with socket.create_connection(("127.0.0.1", server.server_port), timeout=10) as line:
         line.sendall(request.replace(b"%s", host))
