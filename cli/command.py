@@ -105,7 +105,7 @@ _CONFIG = Annotated[
     Path | None,
     typer.Option("--config", metavar="FILE", help="TOML file of settings.", rich_help_panel=RUN),
 ]
-# Flag of every subcommand that `_SettingsCommand.parse_args` reads.
+# A flag of every subcommand. `_SettingsCommand.parse_args` reads it.
 _HELP_ALL = Annotated[bool, typer.Option("--help-all", help="Describe all options and exit.")]
 
 # The flag `--cluster`, for subcommands that can use more than one machine.
@@ -136,7 +136,7 @@ def command(
     fixed : dict, optional
         Settings with a fixed value. They have no flag.
     common : str
-        Group of settings that the help lists among the common options.
+        Title of a group of settings that the help lists among the common options.
 
     Returns
     -------

@@ -67,7 +67,7 @@ def kinds_of(field: Any) -> list[Any]:
 
 
 def choices_of(field: Any) -> list[str]:
-    """Return the values that a setting with few possible values may have, else an empty list."""
+    """Return the choices of a setting whose type is a Literal, else an empty list."""
     return [kind for kind in kinds_of(field) if isinstance(kind, str)]
 
 

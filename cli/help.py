@@ -1,7 +1,7 @@
-"""Writes the help of a command: two columns, options in groups, and the most common group first.
+"""Writes the help of a command as text in two columns. Options are in groups, the common options first.
 
-typer prints help as tables with a column for types. At 80 columns these tables wrap every description after
-two words, so this module writes plain text with the formatter of typer's parser.
+typer prints help as tables with a column for types. If a terminal is 80 characters wide, these tables wrap
+every description after two words. Therefore this module writes text with typer's plain formatter.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from typing import Any
 
 # Title of the group of options that have no other group.
 COMMON = "Common options"
-# Titles of the groups that are last: options of the files that are written, and of the run itself.
+# Titles of the two groups that are written last: options about the files to write, and about the run itself.
 FILES, RUN = "Files", "Run"
-# Number of options above which `--help` describes only the common ones.
+# Number of options above which `--help` describes only the common options.
 MANY = 30
-# Width of the first column, characters. Longer names are followed by a new line.
+# Width of the first column, characters. If a name is longer, its description begins on the next line.
 _FIRST_COLUMN = 26
 
 
@@ -38,14 +38,15 @@ class Group:
 
 
 def groups_of(options: Sequence[Any], common: str) -> list[Group]:
-    """Return the groups of the options of a command, the common one first, `FILES` and `RUN` last.
+    """Return the groups of the options of a command: `COMMON` first, `FILES` and `RUN` last.
 
     Parameters
     ----------
     options : sequence of typer options
-        Options in the order of the help. `rich_help_panel` is the title of the group, None for `COMMON`.
+        Options in the order of the help. The title of an option's group is `rich_help_panel`, None for
+        `COMMON`.
     common : str
-        Title of a further group whose options belong to the common ones.
+        Title of a further group whose options are put into `COMMON`.
     """
     groups = {title: Group(title) for title in (COMMON, FILES, RUN)}
     for option in options:
@@ -66,9 +67,10 @@ def write_options(ctx: Any, formatter: Any, *, common: str = "", complete: bool 
     formatter : HelpFormatter
         Receives the text.
     common : str
-        Title of a further group whose options belong to the common ones.
+        Title of a further group whose options are put into `COMMON`.
     complete : bool
-        Whether all options are described, however many there are.
+        Whether all options are described. Otherwise only the common options are described if there are more
+        than `MANY` options.
     """
     params = ctx.command.get_params(ctx)
     arguments = [param for param in params if param.param_type_name == "argument"]
@@ -97,10 +99,10 @@ def usage_pieces(command: Any, ctx: Any) -> list[str]:
 
 
 def _write(formatter: Any, rows: list[tuple[str, str]]) -> None:
-    """Write two columns. The second one is wrapped here, since the formatter breaks flags at hyphens."""
+    """Write two columns. The second column is wrapped here, because the formatter breaks flags at hyphens."""
     first = min(max(len(name) for name, _ in rows), _FIRST_COLUMN)
     width = formatter.width - first - 4
-    # A line "\b" before a paragraph says that it is not to be wrapped.
+    # A line "\b" before a paragraph tells the formatter not to wrap this paragraph.
     wrapped = [
         (name, "\b\n" + textwrap.fill(text, width, break_on_hyphens=False) if text else "")
         for name, text in rows

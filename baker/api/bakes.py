@@ -85,7 +85,8 @@ def bake(
             Additional file formats of each page: `hdr`, `rgbm` for maps with three colours; `png16`, `png8`
             for maps with one value per texel.
         export : str | Sequence[str], default ()
-            Engines to add a folder for: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md.
+            Engines for which a subfolder is written: `three`, `babylon`, `godot`, `unity` ..., see
+            ENGINES.md.
         include : str | Sequence[str], default ()
             Bake only objects with these node names or node paths; `*` and `?` are wildcards.
         exclude : str | Sequence[str], default ()

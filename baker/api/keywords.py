@@ -65,7 +65,8 @@ class BakeKeywords(TypedDict, total=False):
     # `png8` for maps with one value per texel.
     encode: str | Sequence[str]
 
-    # Engines to add a folder for: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md.
+    # Engines for which a subfolder is written: `three`, `babylon`, `godot`, `unity` ..., see
+    # ENGINES.md.
     export: str | Sequence[str]
 
     # Bake only objects with these node names or node paths; `*` and `?` are wildcards.

@@ -13,7 +13,7 @@ _JOINERS = "\u200c\u200d\u00ad"
 # Unicode categories of escaped characters: control characters, surrogates, line separators, paragraph
 # separators, and format characters, some of which reverse the direction of text.
 _ESCAPED = frozenset({"Cc", "Cs", "Zl", "Zp", "Cf"})
-# A long value between quotes that is no path; the apostrophe of a genitive does not begin one.
+# A long value between single quotes that is not a path. An apostrophe after a letter does not begin a value.
 _QUOTED = re.compile(rf"(?<!\w)'([^'/\\]{{{LONGEST_VALUE + 1},}})'(?!\w)")
 
 
@@ -55,23 +55,23 @@ def shortened(text: str, most: int = LONGEST_VALUE) -> str:
 
 
 def message_line(text: str) -> str:
-    """Return a message in one printable line, with long quoted values cut; see `shortened`.
+    """Return a message in the form of `printable`, with long quoted values in the form of `shortened`.
 
     Parameters
     ----------
     text : str
-        The message. Values of a file are between single quotes; paths are not cut.
+        The message. Values from a file are between single quotes. Paths are not shortened.
 
     Returns
     -------
     str
-        The same object if nothing had to be replaced.
+        The message in one line.
     """
     return _QUOTED.sub(lambda found: f"'{shortened(found[1])}'", printable(text))
 
 
 def printable_lines(text: str) -> str:
-    """Return a text of several lines, each of them made `printable`.
+    """Return a text of several lines, each line in the form of `printable`.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def printable_lines(text: str) -> str:
     Returns
     -------
     str
-        The same number of lines.
+        The lines, as many as in `text`.
     """
     if text.isascii() and text.replace("\n", "").isprintable():
         return text
@@ -91,7 +91,8 @@ def printable_lines(text: str) -> str:
 def _shown(letter: str) -> str:
     if letter in "\n\r\t":
         return " "
-    # The last two characters of each plane are none, and XML forbids two of them.
+    # Also escape the last two code points of each Unicode plane, which are not characters. XML forbids two of
+    # them.
     if letter in _JOINERS or not (unicodedata.category(letter) in _ESCAPED or ord(letter) & 0xFFFE == 0xFFFE):
         return letter
     return letter.encode("unicode_escape", "surrogatepass").decode("ascii")

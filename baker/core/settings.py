@@ -25,7 +25,7 @@ from baker.core.settings_model import (
     threads_setting,
 )
 
-# Groups of the settings, in the help. `BAKE` has the ones that most bakes set.
+# Titles of the groups of the settings in the help. `BAKE` contains the settings that are changed most often.
 BAKE, LIGHT, OCCLUSION = "Bake", "Light and noise", "Ambient occlusion"
 PAGES, SCENE = "Lightmap uv and pages", "Scene"
 # Hemisphere rays per texel of each preset. They are also the default of `light_samples` and `ao_samples`.
@@ -87,7 +87,7 @@ class CommonSettings(Settings):
     encode: Names = setting((), f"Additional file formats of each page: {encodings_in_words()}.", group=FILES)
     export: Names = setting(
         (),
-        "Engines to add a folder for: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md.",
+        "Engines for which a subfolder is written: `three`, `babylon`, `godot`, `unity` ..., see ENGINES.md.",
         group=BAKE,
     )
     include: Names = setting(

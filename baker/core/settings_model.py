@@ -18,7 +18,8 @@ from baker.core.names import unknown_name
 
 # Number of characters of an invalid value that an error quotes.
 _LONGEST = 80
-# Groups of settings in the help: those that every command has, and those of the files that a bake writes.
+# Titles of groups of settings in the help: settings that every command has, and settings of the files that a
+# bake writes.
 RUN, FILES = "Run", "Files"
 
 
@@ -45,7 +46,7 @@ def setting(
     metavar : str
         Placeholder of the value in the help; by default, it is derived from the type.
     group : str
-        Title in the help above this setting and related ones; empty for the common options of a command.
+        Title of the group of the setting in the help; empty for the common options of a command.
     repeated : bool
         Whether the flag may be given several times, in which case its values are concatenated.
     **bounds : object

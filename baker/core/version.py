@@ -1,4 +1,4 @@
-"""The version of baker; the only place where it is written."""
+"""Defines the version of baker; packaging and all other modules read it here."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ MAX_COMPONENTS = 16
 
 # Largest width and height of an image that is read, pixels.
 _LARGEST = 16384
-# File descriptor of stderr, and a lock for its replacement.
+# File descriptor of stderr. The lock is held while the descriptor is redirected.
 _STDERR = 2
 _PRINTING = threading.Lock()
 
@@ -159,7 +159,10 @@ def decode_exr(path: Path) -> DecodedImage:
 
 
 def _check_size(path: Path, window: Any) -> None:
-    """Refuse an image whose data window ((2,), (2,)), inclusive, is empty or too large to be decoded."""
+    """Raise an error if the data window of an image is empty or too large.
+
+    `window` consists of the first and the last pixel (x, y), both inclusive.
+    """
     low, high = (np.asarray(corner, np.int64) for corner in window)
     width, height = (int(n) for n in high - low + 1)
     if not (1 <= width <= _LARGEST and 1 <= height <= _LARGEST):
@@ -169,14 +172,14 @@ def _check_size(path: Path, window: Any) -> None:
 
 @contextlib.contextmanager
 def _silent_library() -> Iterator[None]:
-    """Discard what the OpenEXR library prints to stderr about damaged files; its exceptions say the same."""
+    """Discard what OpenEXR prints to stderr about damaged files, because it raises exceptions as well."""
     with _PRINTING:
         if sys.stderr is not None:
             sys.stderr.flush()
         try:
             kept = os.dup(_STDERR)
         except OSError:
-            # stderr is closed: nothing can be printed.
+            # stderr is closed, so nothing can be printed.
             yield
             return
         nowhere = os.open(os.devnull, os.O_WRONLY)

@@ -1,4 +1,4 @@
-"""Reads TOML files: configurations and lists of jobs."""
+"""Reads TOML files: configuration files and job files."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     path : Path
         A regular file in UTF-8.
     what : str
-        Names the file in messages, as "the configuration".
+        Name of the kind of file in messages, such as "the configuration".
 
     Returns
     -------
     dict
-        The top table.
+        The top-level table.
 
     Raises
     ------
     OSError
         If the file cannot be read.
     SettingsError
-        If the content is not UTF-8 or not valid TOML, or has values that cannot be represented.
+        If the content is not UTF-8 or not valid TOML, or contains values that Python cannot represent.
     """
     import tomllib
 
@@ -42,6 +42,6 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     except RecursionError:
         raise SettingsError(f"{what} has too deeply nested values", file=str(path)) from None
     except ValueError:
-        # Python limits the digits of an integer, and `datetime` the year.
+        # Python limits the number of digits of an integer, and `datetime` limits the year.
         message = f"{what} has a number or a date that is out of range"
         raise SettingsError(message, file=str(path)) from None

@@ -170,7 +170,7 @@ def exponent(value: NDArray[np.float64], truth: NDArray[np.float64]) -> float | 
     Returns
     -------
     float or None
-        The best exponent if its mean residual is less than half of that of exponent 1, otherwise 1. None if
+        The best exponent if its mean residual is less than half that of exponent 1, otherwise 1. None if
         fewer than 32 texels can be used or the reference hardly varies.
     """
     # Leave dark texels out, because small errors there are large ratios.

@@ -21,7 +21,8 @@ def choose_texels(
 ) -> NDArray[np.int64]:
     """Choose about n texels at random, stratified by object and brightness.
 
-    Each object gets a minimum number of texels and a share of the rest in proportion to its texels.
+    First each object gets a minimum number of texels. The remaining texels are distributed in proportion to
+    the objects' numbers of texels.
 
     Parameters
     ----------

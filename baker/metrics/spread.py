@@ -94,7 +94,7 @@ def own_error(
 
 
 def _median(value: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
-    """Return the median of `value` (n,) with weights (n,)."""
+    """Return the weighted median of `value` (n,); `weight` (n,) are the weights."""
     order = np.argsort(value, kind="stable")
     below = np.cumsum(weight[order])
     return float(value[order[np.searchsorted(below, 0.5 * below[-1])]])

@@ -119,7 +119,8 @@ def _valid_points(
     position, normal = points.position[tested], points.normal[tested]
     valid = ~inside_points(reference, position, normal, points.face_normal[tested], random)
     count = valid.sum(axis=1, keepdims=True)
-    # Replace invalid points by the valid points of the texel in turn.
+    # Replace the invalid points by copies of the valid points of the texel. Each valid point is used about
+    # equally often.
     order = np.argsort(~valid, axis=1, kind="stable")
     turn = np.arange(valid.shape[1]) % np.maximum(count, 1)
     pick = np.where(valid | (count == 0), np.arange(valid.shape[1]), np.take_along_axis(order, turn, axis=1))

@@ -49,7 +49,7 @@ from baker.verification.tracing import (
 from baker.verification.unverified_area import UnverifiedArea, measure_unverified_area
 
 CHANNELS = ("irradiance", "ao")
-# Time for path-tracing crops, in addition to the time limit and as a share of it.
+# Time for path-tracing crops, as a share of the time limit. It is added to the time limit.
 _CROP_TIME = 0.1
 
 

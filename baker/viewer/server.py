@@ -150,7 +150,7 @@ def _file(path: Path) -> Answer:
 
 
 class _Recorder:
-    """A stream that keeps the lines read from it."""
+    """A wrapper of a stream that stores the lines read from it."""
 
     def __init__(self, stream: Any) -> None:
         self.stream = stream
@@ -166,11 +166,11 @@ class _Recorder:
 class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     server: ViewServer
-    # Set by the base class, which its stubs do not say.
+    # The first line of the request. The base class sets this attribute, but its type stubs lack it.
     raw_requestline: bytes
 
     def parse_request(self) -> bool:
-        """Parse the request as the base class does; refuse one that is ambiguous, and end its connection."""
+        """Parse the request. If it is ambiguous, refuse it and end the connection, see `strict_http`."""
         stream = self.rfile
         recorder = _Recorder(stream)
         self.rfile = recorder  # type: ignore[assignment]

@@ -1,7 +1,8 @@
-"""Finds requests that two programs could understand differently.
+"""Finds ambiguous HTTP requests, that is, requests that two programs could interpret differently.
 
-Based on: RFC 9112, HTTP/1.1, sections 2.2, 3.2, 5.1, 5.2 and 6.3. A browser sends none of these; a page of
-another site may try them to reach a server on this machine past the check of its host name.
+Browsers do not send such requests. An attacker may send them to pass the server's check of the host name.
+
+Based on: RFC 9112, HTTP/1.1, sections 2.2, 3.2, 5.1, 5.2 and 6.3.
 """
 
 from __future__ import annotations
@@ -11,21 +12,21 @@ from collections.abc import Collection, Sequence
 from urllib.parse import urlsplit
 
 _REQUEST_LINE = re.compile(rb"[A-Z]+ ([!-~]+) HTTP/1\.[01]\r\n")
-# A name, a colon directly behind it, and a value without control characters except tabs.
+# A header line: a name, a colon directly after it, and a value without control characters except tabs.
 _FIELD = re.compile(rb"([!#$%&'*+.^_`|~0-9A-Za-z-]+):[ \t]*([^\x00-\x08\x0a-\x1f\x7f]*?)[ \t]*\r\n")
 
 
 def fault_of_request(request_line: bytes, fields: Sequence[bytes], names: Collection[str]) -> str | None:
-    """Return why a request is ambiguous or not for this server.
+    """Return the reason if a request is ambiguous or names another server, else None.
 
     Parameters
     ----------
     request_line : bytes
-        Its first line, with the line end.
+        The first line of the request, with its line end.
     fields : sequence of bytes
-        The lines of its header as received, without the empty line at the end.
+        The lines of the request's header as received, without the empty line at the end.
     names : collection of str
-        Host names with port that this server has.
+        The host names of this server, each with the port.
 
     Returns
     -------
@@ -50,7 +51,7 @@ def fault_of_request(request_line: bytes, fields: Sequence[bytes], names: Collec
 
 
 def _fault_of_target(target: str, host: str, names: Collection[str]) -> str | None:
-    """Return why a request target does not name a path on `host`."""
+    """Return the reason if a request target is not a path on `host`, else None."""
     if target.startswith("/"):
         return "an empty host in the path" if target.startswith("//") else None
     try:

@@ -125,7 +125,7 @@ def degenerate(context: CheckContext) -> Iterator[RawFinding]:
 
 @check("uv.flipped", group="uv", severity="warning", fix=_UNWRAP)
 def flipped(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces whose orientation in uv is opposite to that of their chart, which is folded there."""
+    """Faces that are flipped in uv against the rest of their chart, because the chart is folded there."""
     for m, uv in laid_out(context):
         sign = np.sign(uv.signed_area)
         major = np.sign(uv.per_chart(uv.signed_area))

@@ -110,7 +110,8 @@ class JsonObject:
         value = self._get(key, default)
         if not isinstance(value, str):
             self.fail(f"expected a string, found {_show(value)}", key)
-        # Names are printed, written to reports and to files of engines; a lone surrogate fits into no file.
+        # Make names printable, because they are printed and written to reports and exports. A lone surrogate
+        # cannot be written to a file.
         return printable(value) if key == "name" else value
 
     def strings(self, key: str) -> list[str]:

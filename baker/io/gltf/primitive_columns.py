@@ -102,9 +102,10 @@ def why_locked(source: SourceDocument, mesh: int, primitive: Json) -> str:
 
 
 def _malformed(document: dict[str, Any], primitive: Json) -> str:
-    """Return the first member of a primitive that refers to no well-formed accessor, "" without one.
+    """Return the name of the first member of a primitive that is malformed, "" if there is none.
 
-    Reading a scene checks the members that a bake uses; these are all members.
+    An attribute or `indices` is malformed if it does not refer to a well-formed accessor. The importer checks
+    only the members that a bake uses. This function checks all attributes.
     """
     if not isinstance(primitive.get("extensions", {}), dict):
         return "extensions"
@@ -128,7 +129,7 @@ def _is_accessor(document: dict[str, Any], index: Any) -> bool:
 
 
 def _item(items: Any, index: Any) -> Json | None:
-    """Return an object with well-formed extensions from an array of a document, None if there is none."""
+    """Return `items[index]` if it exists and is a JSON object with well-formed `extensions`, else None."""
     if not isinstance(items, list) or not isinstance(index, int) or not 0 <= index < len(items):
         return None
     item = items[index]

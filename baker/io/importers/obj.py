@@ -73,7 +73,7 @@ def import_obj(source: SceneFile) -> Scene:
             message = f"faces without a known material are grey; MTL names {len(materials)}"
             warnings.append(SceneWarning("no-material", message, source.path.name))
         materials.append(GREY)
-    # The parser has matched materials by the names of the file.
+    # Make names printable only now, because the parser matches materials by their names in the file.
     materials = [replace(material, name=printable(material.name)) for material in materials]
     return scene_of_meshes(source, groups, materials, warnings, digest.hexdigest())
 

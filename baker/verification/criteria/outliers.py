@@ -1,4 +1,4 @@
-"""Counts the texels that differ from all their neighbours, and those of them whose value is wrong."""
+"""Counts the outliers, which are texels that differ from all their neighbours, and the wrong outliers."""
 
 from __future__ import annotations
 
