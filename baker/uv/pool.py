@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import queue
+import signal
 import subprocess
 import threading
 from collections.abc import Sequence
@@ -10,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from baker.core.child_process import start_module
+from baker.core.errors import ResourceError
 from baker.core.progress import Progress, report
 from baker.core.stage import Stage
 from baker.uv.worker import receive_charts, send_job
@@ -18,6 +21,14 @@ from baker.uv.xatlas_charts import ChartJob, FlatCharts, cut_charts
 # Number of triangles of all jobs below which they run in this process. Starting a worker process takes 0.2 s,
 # longer than cutting so few triangles.
 IN_PROCESS_TRIANGLES = 3000
+# Largest time between the end of a worker's pipe and the end of its process, seconds.
+_MOMENT = 1.0
+# How a process ends if native code crashes, as `Popen.returncode` has it.
+_CRASHES = {-getattr(signal, name, 0) for name in ("SIGSEGV", "SIGABRT", "SIGBUS", "SIGFPE", "SIGILL")}
+_LOST = (
+    "a process that cuts charts was killed twice, most likely for lack of memory; close other programs, or "
+    "use fewer `threads`"
+)
 
 
 def run_jobs(jobs: Sequence[ChartJob], threads: int, progress: Progress, until: float) -> list[FlatCharts]:
@@ -37,13 +48,15 @@ def run_jobs(jobs: Sequence[ChartJob], threads: int, progress: Progress, until: 
     Returns
     -------
     list of FlatCharts
-        Charts of each job, in the order of `jobs`. If a worker process crashed on a job, all its triangles
-        have chart -1.
+        Charts of each job, in the order of `jobs`. If xatlas crashed twice on a job, all its triangles have
+        chart -1.
 
     Raises
     ------
     Cancelled
         If `progress` returned a truthy value. The worker processes are then killed.
+    ResourceError
+        If a worker process was lost twice at one job for another reason than a crash.
     """
     total = sum(len(job.triangle) for job in jobs)
     if total < IN_PROCESS_TRIANGLES:
@@ -67,6 +80,8 @@ class _Pool:
             self.waiting.put(k)
         self.processes: list[subprocess.Popen[bytes]] = []
         self.errors: list[BaseException] = []
+        # Jobs at which a worker was lost once.
+        self.retried: set[int] = set()
         self.threads = [threading.Thread(target=self._feed, daemon=True) for _ in range(n_workers)]
 
     def run(self, progress: Progress, until: float) -> list[FlatCharts]:
@@ -118,10 +133,15 @@ class _Pool:
                     break
                 charts = self._ask(process, self.jobs[k])
                 if charts is None:
-                    # xatlas crashed on this job. Give its triangles chart -1; `planar_charts` lays them out
-                    # later.
-                    self._end(process)
-                    process = None
+                    ended, process = self._how_it_ended(process), None
+                    if k not in self.retried:
+                        self.retried.add(k)
+                        self.waiting.put(k)
+                        continue
+                    if ended not in _CRASHES:
+                        raise ResourceError(_LOST)
+                    # xatlas crashed twice on this job. Give its triangles chart -1; `planar_charts` lays them
+                    # out later.
                     n = len(self.jobs[k].triangle)
                     charts = FlatCharts(np.zeros((n, 3, 2)), np.full(n, -1, np.int32))
                 self.results[k] = charts
@@ -129,6 +149,7 @@ class _Pool:
                     self.done += len(self.jobs[k].triangle)
         except BaseException as error:
             self.errors.append(error)
+            self.stopped = True
         finally:
             if process is not None:
                 self._end(process)
@@ -143,6 +164,13 @@ class _Pool:
         except (BrokenPipeError, OSError):
             return None
 
+    def _how_it_ended(self, process: subprocess.Popen[bytes]) -> int:
+        """Return the exit code of a process that has closed its pipe, or minus the signal that ended it."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(_MOMENT)
+        self._end(process)
+        return process.returncode
+
     @staticmethod
     def _end(process: subprocess.Popen[bytes]) -> None:
         assert process.stdin is not None
@@ -150,8 +178,6 @@ class _Pool:
         process.kill()
         process.wait()
         process.stdout.close()
-        try:
+        # Closing the pipe flushes its buffer, which fails because the process has ended.
+        with contextlib.suppress(OSError):
             process.stdin.close()
-        except OSError:
-            # Closing the pipe flushes its buffer, which fails because the process has ended.
-            return

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from uv_scenes import ball_mesh, box_mesh, torus_mesh
+from uv_scenes import ball_mesh, box_mesh, job_of, torus_mesh, welded
 from uv_truth import covered_texels
 
 import baker.uv.pool as pool
@@ -21,7 +21,7 @@ from baker.uv.kernels.uv_overlap import count_close, mark_charts
 from baker.uv.pack import Shapes, fit_page, pack
 from baker.uv.parts import cut_parts
 from baker.uv.planar import lay_flat, planar_charts
-from baker.uv.xatlas_charts import ChartJob, cut_charts
+from baker.uv.xatlas_charts import cut_charts
 
 
 def strictly_inside(triangle: np.ndarray, point: np.ndarray, slack: float) -> bool:
@@ -187,19 +187,7 @@ def test_a_fine_ball_is_cut_into_parts_within_a_cone_and_a_box_is_not():
         mean = normal[part == k].sum(axis=0)
         assert (normal[part == k] @ mean).min() > 0.7 * np.linalg.norm(mean)
     box = box_mesh()
-    assert cut_parts(*_welded(box)).max() == 0
-
-
-def _welded(mesh):
-    label = weld(mesh.position)
-    place = np.zeros((label.max() + 1, 3))
-    place[label] = mesh.position
-    return place, label[mesh.triangle]
-
-
-def job_of(mesh) -> ChartJob:
-    place, triangle = _welded(mesh)
-    return ChartJob(place, triangle, np.array([0, len(place)]), np.array([0, len(triangle)]))
+    assert cut_parts(*welded(box)).max() == 0
 
 
 def test_workers_answer_as_this_process_does():
@@ -210,13 +198,6 @@ def test_workers_answer_as_this_process_does():
         here = cut_charts(job)
         assert answer.uv.tobytes() == here.uv.tobytes()
         assert answer.chart.tobytes() == here.chart.tobytes()
-
-
-def test_a_worker_that_dies_leaves_its_triangles_without_chart(monkeypatch):
-    monkeypatch.setattr(pool, "send_job", lambda stream, job: stream.write(b"\xff" * 8) and stream.close())
-    job = job_of(ball_mesh(4))
-    (answer,) = pool.run_jobs([job], 1, silent, 1.0)
-    assert (answer.chart == -1).all()
 
 
 @pytest.mark.timed

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.scene import Instance, Material, Mesh, Scene
+from baker.topology.weld import weld
+from baker.uv.xatlas_charts import ChartJob
 
 Matrix = NDArray[np.float64]
 
@@ -165,3 +167,17 @@ def ball_mesh(subdivisions: int) -> Mesh:
         position, triangle = np.unique(parts.reshape(-1, 3).round(12), axis=0, return_inverse=True)
         triangle = triangle.reshape(-1, 3)
     return make_mesh(position / np.linalg.norm(position, axis=1, keepdims=True), triangle, "ball")
+
+
+def welded(mesh):
+    """Return vertices welded by position, and triangles of them."""
+    label = weld(mesh.position)
+    place = np.zeros((label.max() + 1, 3))
+    place[label] = mesh.position
+    return place, label[mesh.triangle]
+
+
+def job_of(mesh) -> ChartJob:
+    """Return a mesh as one job of a worker."""
+    place, triangle = welded(mesh)
+    return ChartJob(place, triangle, np.array([0, len(place)]), np.array([0, len(triangle)]))
