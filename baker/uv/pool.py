@@ -26,7 +26,7 @@ _MOMENT = 1.0
 # How a process ends if native code crashes, as `Popen.returncode` has it.
 _CRASHES = {-getattr(signal, name, 0) for name in ("SIGSEGV", "SIGABRT", "SIGBUS", "SIGFPE", "SIGILL")}
 _LOST = (
-    "a process that cuts charts was killed twice, most likely for lack of memory; close other programs, or "
+    "a process that cuts charts has died twice, most likely for lack of memory; close other programs, or "
     "use fewer `threads`"
 )
 
@@ -88,7 +88,7 @@ class _Pool:
         try:
             for thread in self.threads:
                 thread.start()
-            while any(thread.is_alive() for thread in self.threads):
+            while not self.errors and any(thread.is_alive() for thread in self.threads):
                 report(
                     progress,
                     Stage.UNWRAP,
@@ -149,7 +149,6 @@ class _Pool:
                     self.done += len(self.jobs[k].triangle)
         except BaseException as error:
             self.errors.append(error)
-            self.stopped = True
         finally:
             if process is not None:
                 self._end(process)

@@ -51,7 +51,7 @@ def test_a_lost_worker_is_replaced(jobs, lose, number) -> None:
 
 def test_a_worker_that_is_killed_twice_is_a_lack_of_memory(jobs, lose) -> None:
     lose(signal.SIGKILL, 99)
-    with pytest.raises(ResourceError, match="was killed twice, most likely for lack of memory") as caught:
+    with pytest.raises(ResourceError, match="has died twice, most likely for lack of memory") as caught:
         pool.run_jobs(jobs, 2, silent, 1.0)
     assert caught.value.exit_code == 4
 
