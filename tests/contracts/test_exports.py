@@ -55,7 +55,7 @@ def result(folder, **settings):
         builder.node(mesh=mesh, translation=[2.0 * number, 0.0, 0.0], **named)
     scene = load_scene(write(folder / "level.glb", builder))
     row = np.arange(4, dtype=np.int32)
-    # Each page has three squares in strips of four columns; its last strip is empty.
+    # Each page has four strips of four columns. Three strips contain a square each, and the last is empty.
     layouts = tuple(
         InstanceLayout(i, i % 2, row, strip(i), np.int32(QUAD_TRIANGLE), np.full(2, i, np.int32), False, 16.0)
         for i in range(len(NODES))

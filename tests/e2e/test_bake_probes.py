@@ -33,14 +33,14 @@ def mean(probe, points, normal, channel="irradiance"):
 
 
 def sunlit(y):
-    """Return the floor point lit by sun through height y of the left half of the living room's window."""
+    """Return the floor point that the sun lights through the window's left half at height y."""
     way = np.array([0.72, -0.62, 0.31])
     start = np.array([-0.2, y, 1.55])
     return start + way * (y / 0.62)
 
 
 def test_sun_lies_on_the_floor_where_the_window_lets_it(interior):
-    # 20000 lx x cosine at the floor x mean of the sun's colour.
+    # Direct irradiance: 20000 lx x cosine at the floor x mean of the sun's colour.
     direct = 20000 * 0.62 / np.linalg.norm([0.72, 0.62, 0.31]) * (1.0 + 0.93 + 0.82) / 3
     spots = [sunlit(y) for y in (1.14, 1.17, 1.2)]
     lit = [interior.at(p, UP, within=0.02).mean() for p in spots]

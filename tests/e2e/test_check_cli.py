@@ -1,4 +1,4 @@
-"""`baker check` on the command line: exit codes, JSON, SARIF, JUnit, and the places of `ignore`."""
+"""`baker check` on the command line: exit codes, JSON, SARIF, JUnit, and where `ignore` can be set."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Light through MASK and BLEND surfaces: holes at the correct uv, and the share 1 - alpha."""
+"""MASK surfaces pass light at the uv of their holes, and BLEND surfaces pass the share 1 - alpha."""
 
 from __future__ import annotations
 

@@ -21,13 +21,13 @@ def wall_and_floor(height):
 
 
 def ao_rows(builder, floor, seed, **settings):
-    """Return (rows,) AO of the floor at each distance, averaged along the wall."""
+    """Return the AO (rows,) of the rows of floor texels, each averaged along the wall."""
     result = builder.bake(channels=["ao"], ao_samples=256, seed=seed, **settings)
     return floor.values(result, "ao")[..., 0].mean(axis=1)
 
 
 def test_closed_forms_agree_with_quadrature():
-    """The closed forms agree with a sum over the projected disc."""
+    """The closed forms agree with sums over the unit disc, to which directions are projected."""
     x, y = np.meshgrid(*[(np.arange(1500) + 0.5) / 750 - 1] * 2)
     inside = x * x + y * y < 1
     x, z = x[inside], np.sqrt(1 - x[inside] ** 2 - y[inside] ** 2)

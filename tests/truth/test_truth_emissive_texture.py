@@ -58,7 +58,7 @@ def panels(size=48):
 
 
 def spots():
-    """Return for each panel the uv centres (n, 2) of lit spots, and the area of a spot, texels."""
+    """Return for each panel the uv (n, 2) of its lit spots, and the area of a spot, (SIDE / N)^2."""
     one = np.array([[5.5, 50.5]]) / N
     way = np.arange(5)
     fold = [np.where(way % 2 == 0, way + s, way + 1 - s) / 5 for s in (40.5 / N, 20.5 / N)]
@@ -99,7 +99,7 @@ def test_the_reference_finds_a_lit_texel():
             truth = irradiance(points, panel)
             error = mean[..., panel].std(axis=1) / math.sqrt(32)
             assert (np.abs(mean[..., panel].mean(axis=1) - truth) < critical(27) * error + 1e-3 * truth).all()
-            # If a path hit a spot by chance, its copy would be about a hundred times the truth.
+            # If a path hit a spot by chance, the estimate would be about a hundred times the truth.
             assert mean[..., panel].max() < 2.0 * truth.max()
 
 
@@ -140,8 +140,8 @@ def test_a_panel_close_to_a_wall_has_no_sparks(nearest):
     builder.materials[material] = replace(builder.materials[material], emission_texture=texture)
     builder.quad((-0.3, 0.1, -0.3), (0.6, 0, 0), (0, 0, 0.6), material, (4, 4))
     value = floor.values(builder.bake(samples=256, bounces=0))[..., 0]
-    # Truth for nine square emitters with sides of 3.75 cm. Bilinear lookups make them tents of the same
-    # integral.
+    # The truth is the light of nine square emitters with sides of 3.75 cm. Bilinear lookups turn the
+    # squares into tents with the same integral.
     axis = (np.arange(4, 12, 3) + 0.5) / 16 * 0.6 - 0.3
     step = (np.arange(8) + 0.5) / 8 * 0.0375 - 0.01875
     place = (axis[:, None] + step).reshape(-1)

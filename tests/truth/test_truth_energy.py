@@ -1,4 +1,4 @@
-"""Energy is conserved, and bounces are terms of the Neumann series of an explicit matrix."""
+"""Energy is conserved, and the light of N bounces is a partial sum of the Neumann series."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_what_is_emitted_is_absorbed_or_escapes(albedo, sky):
 
 
 def test_closed_black_room_absorbs_the_flux_of_its_lights():
-    """`solve["energy"]["emitted"]` is the flux of the lights, 4 pi I + pi L A."""
+    """`solve["energy"]["emitted"]` is 4 pi I of the point light, plus pi L A of each emitter side."""
     emitted = []
     for seed in range(6):
         builder = SceneBuilder(64)
@@ -58,7 +58,7 @@ def test_closed_black_room_absorbs_the_flux_of_its_lights():
 
 @pytest.fixture(scope="module")
 def system():
-    """Return patches, form factors, albedo, and exitance after the first reflection, of the open room."""
+    """Return patches, form factors, albedo, random exitance and the dense matrix of the open room."""
     builder, _ = open_room(texels=6)
     world, patches, matrix = form_factors(builder, n_rays=128)
     weight = np.maximum(world.texels.area, 1e-12)

@@ -217,7 +217,7 @@ def test_integrating_sphere(estimator, albedo, passes):
         (PunctualLight("point", "p", 0, (3.0, 2.0, 1.0), (0, 0, 1)), (3, 2, 1)),
         (PunctualLight("point", "p", 0, (1.0, 1.0, 1.0), (0, 1, 1)), (0.5**1.5,) * 3),
         (PunctualLight("spot", "s", 0, (4.0, 4.0, 4.0), (0, 0, 2), (0, 0, -1), 0.2, 0.4), (1, 1, 1)),
-        # A point in the fall-off between the cones: the squared fraction of the way from outer to inner cone.
+        # A point between the cones: the factor is ((cos - cos_outer) / (cos_inner - cos_outer))^2.
         (
             PunctualLight(
                 "spot", "s", 0, (8.0,) * 3, (0, 0, 2), (math.sin(0.3), 0, -math.cos(0.3)), 0.2, 0.4
@@ -245,7 +245,7 @@ def test_lights_without_area_are_exact(light, truth, estimator):
 
 @pytest.mark.parametrize("estimator", ["light", "bdpt"])
 def test_a_point_light_over_a_square_half_in_shadow(estimator):
-    """The mean over a square is I x (its solid angle - solid angle of the screen) / area."""
+    """Mean E is I x (solid angle of the square - solid angle of the screen) / area, seen from the light."""
     screen = Quad((-0.1, -0.2, 0.5), (0.2, 0, 0), (0, 0.3, 0), grey(0.0, double_sided=True))
     light = PunctualLight("point", "p", 0, (2.0, 2.0, 2.0), (0.1, 0.0, 1.0))
     scene = replace(quad_scene([screen]), lights=(light,))

@@ -51,7 +51,7 @@ def batches(values):
 
 
 def compare(ours, theirs, least):
-    """Compare (mean, error) of both programs for single values and for the sum."""
+    """Compare the results (mean, error) of both programs, value by value and summed over all values."""
     # The second term avoids a division by 0 where neither program has noise.
     error = np.hypot(ours[1], theirs[1]) + 1e-9 * theirs[0].max()
     z = (ours[0] - theirs[0]) / error

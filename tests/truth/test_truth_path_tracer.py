@@ -18,7 +18,7 @@ SEEDS = 6
 
 
 def whole_texels(result, rng, n):
-    """Choose n texels inside one triangle each, and return (row, column), instance and triangle of each."""
+    """Return (n, 4): row, column, instance and triangle of random texels that lie inside one triangle."""
     found = []
     size = result.atlas.resolution
     for number, layout in enumerate(result.atlas.layouts):

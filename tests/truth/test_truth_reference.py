@@ -36,7 +36,7 @@ def test_estimators_agree_pairwise():
     bound = critical(len(pairs), 23 * 16)
     for a, b in pairs:
         assert abs(mean[a] - mean[b]) < bound * math.hypot(error[a], error[b]), f"{a} and {b}"
-    # The standard error is 1 % for estimators that sample lights, and 4 % for the others.
+    # The standard error is at most 1 % for estimators that sample lights, and at most 4 % for the others.
     for name, how in ESTIMATORS.items():
         assert error[name] < (0.01 if how.aim else 0.04) * mean[name], name
 

@@ -66,7 +66,7 @@ def test_every_kind_of_light_is_coloured(light):
 
 @pytest.mark.parametrize("alpha", [0.6, 0.9])
 def test_a_light_behind_a_dense_pane_is_no_noisier_than_without(alpha):
-    """Compared with Lambert's formula; without a pane, 64 samples give a texel 2 % of noise."""
+    """E is T times Lambert's formula. Without a pane, the 64 samples of a texel have a noise of 2 %."""
     square = np.array([(-0.5, 1, -0.5), (0.5, 1, -0.5), (0.5, 1, 0.5), (-0.5, 1, 0.5)])
     builder, floor = floor_under(pane(alpha=alpha), light="", texels=24)
     builder.quad(square[0], square[1] - square[0], square[3] - square[0], builder.material(0.0, 5.0), (8, 8))

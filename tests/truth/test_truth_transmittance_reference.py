@@ -64,7 +64,7 @@ def test_one_place_under_a_pane_sees_a_point_light_by_its_share(estimator, place
 
 @pytest.mark.parametrize("estimator", ["uniform", "mis", "bdpt"])
 def test_a_pane_before_the_sky_in_a_picture(estimator):
-    """A pane in front of the sky shows T plus the reflected sky on the viewer's side, alpha times colour."""
+    """Before a sky of radiance 1, a pane has the radiance T (transmitted) + alpha x colour (reflected)."""
     pane = Quad((-4, -4, 0), (8, 0, 0), (0, 8, 0), STAINED)
     estimate = new_estimate(64, 3, 16)
     with build_reference(quad_scene([pane]), sky=(1.0, 1.0, 1.0), lambertian=True, threads=2) as reference:
