@@ -19,7 +19,7 @@ from baker.cli.interrupt import INTERRUPTED
 
 # Time that the child has to stop by itself after a signal, seconds.
 GRACE = 0.6
-# Exit codes.
+# Exit code after a crash of native code, or after a kill that the user did not request.
 RESOURCE = 4
 
 _STOPPING = ("SIGINT", "SIGTERM", "SIGHUP")
@@ -170,7 +170,7 @@ class _Watch:
         _, status = os.waitpid(self.child, 0)
         signal.setitimer(signal.ITIMER_REAL, 0)
         if self.stopping or not os.WIFEXITED(status):
-            self._send(signal.SIGKILL)  # end processes that the child started and that still run
+            self._send(signal.SIGKILL)  # end the remaining processes that the child started
             self._tidy()
         if os.WIFEXITED(status):
             return os.WEXITSTATUS(status)

@@ -30,7 +30,7 @@ class Location:
     node: int | None = None
 
     def __post_init__(self) -> None:
-        """Make the name printable."""
+        """Convert the name with `printable`."""
         super().__setattr__("object", printable(self.object))
 
 
@@ -73,7 +73,7 @@ class RawFinding:
     more: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Make the message one printable line."""
+        """Convert the message to one line with `message_line`."""
         object.__setattr__(self, "message", message_line(self.message))
 
 

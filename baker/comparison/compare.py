@@ -227,9 +227,12 @@ def _choose(
 ) -> tuple[NDArray[np.int64], TrianglePoints, TrianglePoints, NDArray[np.int64]]:
     """Choose texels of bake a that have a matching surface point in bake b.
 
-    Returns the texels (n,) as (page * H + row) * W + column, their points on the surfaces of a and of b, and
-    for each instance of a the number of texels that had no matching point and were dropped. This number is 0
-    for objects that b lacks.
+    The results are:
+
+    - the texels (n,) as (page * H + row) * W + column;
+    - their points on the surface of a, and the matching points on the surface of b;
+    - for each instance of a, the number of texels that were dropped because they have no matching point. This
+      number is 0 for objects that b lacks.
     """
     brightness = bake.maps[name].mean(axis=3, dtype=np.float64).reshape(-1)
     owner = owner.reshape(-1)

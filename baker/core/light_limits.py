@@ -6,8 +6,8 @@ from baker.core.errors import InputError
 from baker.core.light_kind import check_light_kinds, kind_of
 from baker.core.scene import Scene
 
-# Largest intensity (cd or lx) and emission (cd/m2): the square of the resulting irradiance is below the
-# largest float32 number. For comparison, the disc of the sun has 2e9 cd/m2.
+# Largest intensity (cd or lx) and emission (cd/m2) that a bake accepts. Up to this limit, the square of the
+# resulting irradiance fits into float32. For comparison, the disc of the sun has 2e9 cd/m2.
 BRIGHTEST = 1e15
 
 

@@ -76,7 +76,7 @@ class Registry(Generic[T]):
         Raises
         ------
         SettingsError
-            If no plugin has that name. The message suggests the nearest name and lists all names.
+            If no plugin has that name. The message suggests the nearest name, and lists all except `hidden`.
         """
         plugin = self.get(name)
         if plugin is None:

@@ -217,7 +217,7 @@ class SceneWarning:
     object: str = ""
 
     def __post_init__(self) -> None:
-        """Make message and object printable lines."""
+        """Convert the message with `message_line`, and the name of the object with `printable`."""
         object.__setattr__(self, "message", message_line(self.message))
         object.__setattr__(self, "object", printable(self.object))
 

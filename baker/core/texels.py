@@ -30,8 +30,8 @@ class TexelBuffer:
     first : (n_front + 1,) int64
     entry : (m,) int32
     entry_area : (m,) float32
-        The square of front texel k touches the triangles entry[first[k] : first[k + 1]]; their areas inside
-        the square, in texels, are in the same slice of `entry_area`.
+        The square of front texel k touches the triangles entry[s] with the slice s = first[k] : first[k + 1].
+        entry_area[s] are the areas of these triangles inside the square, in texels.
     chart, instance : (n,) int32
         Indices of chart and instance.
     area : (n,) float32, m2

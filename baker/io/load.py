@@ -111,7 +111,7 @@ def load_scene(
     ------
     InputError
         If the file or a file that it refers to is missing, unreadable, malformed or outside the folder of the
-        scene, if it requires an unknown extension, or if it contains nothing to bake.
+        scene. If the scene requires an unknown extension, or contains nothing to bake.
     SettingsError
         If `up` is neither "y" nor "z", or `scale` is not a positive number.
     ResourceError

@@ -62,7 +62,7 @@ class Outcome:
     why : str
         The reason for the state, as text for users.
     seconds : float
-        Duration of the bake, seconds; 0 if the job was not baked.
+        Duration of the bake, seconds. If the job was not baked, the duration of its examination, or 0.
     code : int
         Exit code for a failed job; 0 otherwise.
     """
@@ -151,7 +151,7 @@ class _Run:
                         self.hear(event)
                     self.report_all(blocked=blocked)
             finally:
-                # Keep the locks until running jobs are stopped and their unfinished output is removed.
+                # Keep the locks until the running jobs are stopped and their incomplete writes are undone.
                 self.executor.close()
                 for ticket in self.running.values():
                     _release(ticket)
@@ -214,7 +214,7 @@ class _Run:
             self.start(ticket)
 
     def start(self, ticket: _Ticket) -> None:
-        """Start a job if its output folder is not locked and still out of date."""
+        """Start a job, unless its output folder is locked or has become up to date."""
         job = ticket.job
         assert job.out is not None
         try:

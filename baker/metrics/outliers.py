@@ -1,8 +1,8 @@
 """Finds texels of a map that differ from all their neighbours, and texels where light changes most.
 
-These texels are few, so random sampling would miss them. The map alone does not show whether they are wrong:
-a correct texel next to a gap through which light enters may differ from its neighbours as much as a wrong
-texel. They are therefore compared with path-traced values.
+These texels are few, so random sampling would miss them. The map alone does not show whether they are wrong.
+For example, a correct texel next to a gap through which light enters may differ from its neighbours as much
+as a wrong texel. Therefore these texels are compared with path-traced values.
 """
 
 from __future__ import annotations

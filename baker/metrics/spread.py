@@ -15,9 +15,9 @@ deviations.
 The common shift a of all points is part of the bias and not of b. (In a group that is lit by rare paths, most
 points lack such a path. All of them have the same negative error, the light of these paths.)
 
-s is estimated from the passes of the reference. The factor f, at least 1, corrects s. It is the solution of
-the same equation with b = 0 and a = 0, with v - r replaced by half the difference of two halves of the
-reference.
+s is estimated from the passes of the reference. The factor f, at least 1, corrects s. f is the solution of
+the same equation with b = 0 and a = 0. In this equation, v - r is replaced by half the difference of two
+halves of the reference.
 
 psi is bounded, so the mean of psi over n points has a finite standard error for any distribution of the
 errors. The lower and upper bounds of b solve the equation with z of these standard errors subtracted from, or

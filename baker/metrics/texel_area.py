@@ -217,8 +217,12 @@ def _spread(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Choose k = `n_points` random surface points inside each of the n texels `pixel`.
 
-    Returns the triangles (n, k) of the points, their barycentric weights (n, k, 3), the covered area (n,) of
-    each texel in texels, and the mean of its points in its square (n, 2), (column, row), 0 to 1.
+    The results are:
+
+    - the triangle of each point (n, k);
+    - the barycentric weights of each point (n, k, 3);
+    - the area of each texel that surface covers (n,), in texels;
+    - the mean position of each texel's points in its square (n, 2), (column, row), 0 to 1.
     """
     wanted = np.full((int(geometry.page.max(initial=0)) + 1) * resolution * resolution, -1, np.int32)
     wanted[pixel] = np.arange(len(pixel), dtype=np.int32)

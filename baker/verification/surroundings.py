@@ -80,7 +80,7 @@ def find_surroundings(reference: Reference, points: SurfacePoints, seed: int) ->
     gap = (near.mean(axis=1) > _GAP) | inside
     room = np.full(len(air), -1, np.int32)
     eyes = np.zeros((0, 3))
-    # Run a second round from the points in the air of texels without a room, which finds small rooms.
+    # The second round uses points in the air of texels that are in no room yet. It finds small rooms.
     for _ in range(2):
         left = np.flatnonzero((room < 0) & ~gap)
         some = _outside(reference, air[left[random.permutation(len(left))[:_AIR]]], seed)
@@ -152,8 +152,11 @@ def _first_look(
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64]]:
     """Cast one ray from each of k points of n texels.
 
-    Returns (n, k) bool, whether the ray hits a black back or the inside of a solid; (n, k) bool, whether the
-    hit is near; and (n, 3) float64, for each texel the midpoint of its longest ray that hits neither.
+    The results are:
+
+    - (n, k) bool: whether the ray hits a black back or the inside of a solid;
+    - (n, k) bool: whether the hit is near;
+    - (n, 3) float64: for each texel, the midpoint of the longest ray that hits no black back and no inside.
     """
     n, k = points.position.shape[:2]
     origin = lifted(reference, points.position, points.face_normal)

@@ -17,9 +17,10 @@ from baker.checks.rule import check
 from baker.core.budget import FILLED, Workload, image_bytes, texels_and_pages
 from baker.core.stage import Stage
 
-# Constants of the time estimate without an earlier bake, measured on cornell.glb, hall.glb and interior.glb:
-# number of rays that a bake traces in the time of one ray of the probe;
-# time per texel of the stages without rays, seconds times threads.
+# Constants of the time estimate if there is no earlier bake, measured on the scenes cornell.glb, hall.glb and
+# interior.glb:
+# _OF_PROBE: number of rays that a bake traces in the time in which the probe traces one ray;
+# _PER_TEXEL_SECONDS: time per texel of all stages without rays, seconds, multiplied by the number of threads.
 _OF_PROBE, _PER_TEXEL_SECONDS = 1.7, 1.5e-5
 # Duration of the probe, seconds.
 PROBE_SECONDS = 1.0

@@ -36,10 +36,14 @@ NOTES = {
 def file_note(context: CheckContext) -> Iterator[RawFinding]:
     """Parts of the file that a bake ignores, or interprets in one of several possible ways.
 
-    The key `note` has the code of the importer's warning. Reported are unknown extensions, skins (posed by
-    their joints), morph targets (the base shape is baked), primitives of points and lines, several scenes in
-    one file, missing texture coordinates or material libraries, and materials of an unknown model. Unreadable
-    parts that a bake does not need are reported as well: normal maps, unused files, tangents, cameras.
+    The key `note` has the code of the importer's warning. Reported are:
+
+    - unknown extensions, and materials of an unknown model;
+    - skins, which are posed by their joints, and morph targets, of which the base shape is baked;
+    - primitives of points and lines;
+    - several scenes in one file;
+    - missing texture coordinates or material libraries;
+    - unreadable parts that a bake does not need: normal maps, unused files, tangents, cameras.
     """
     for warning in context.scene.warnings:
         if warning.code in NOTES:

@@ -44,8 +44,8 @@ def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None)
     Raises
     ------
     SettingsError
-        If `out` is a file or a name that no folder can have, if it contains files that baker did not write
-        and `force` is False, or if the bake would replace the input.
+        If `out` is a file or a name that no folder can have. If `out` contains files that baker did not write
+        and `force` is False. If the bake would replace the input.
     ResourceError
         If the folder cannot be read or written to.
     """

@@ -67,7 +67,7 @@ def reads_texcoord_1(document: Json, primitive: Json, *, occlusion: bool) -> boo
     Returns
     -------
     bool
-        True if so, also for a material of KHR_materials_variants.
+        Materials of KHR_materials_variants are included.
     """
     for holder in material_holders(primitive):
         if _names_material(document, holder.get("material")):
@@ -90,7 +90,7 @@ def reads_texture(document: Json, primitive: Json) -> bool:
     Returns
     -------
     bool
-        True if so, also for a material of KHR_materials_variants.
+        Materials of KHR_materials_variants are included.
     """
     return any(
         next(_texture_infos(document["materials"][holder["material"]], occlusion=True), None) is not None
@@ -100,7 +100,9 @@ def reads_texture(document: Json, primitive: Json) -> bool:
 
 
 def assign_materials(document: Json, uses: list[BakedUse], ao_texture: dict[int, int]) -> None:
-    """Add the AO texture to the materials of baked primitives; copy a material if its primitives differ.
+    """Add AO textures to the materials of baked primitives, and update TEXCOORD numbers.
+
+    A material is copied if its primitives need different changes.
 
     Parameters
     ----------
@@ -148,7 +150,10 @@ def _names_material(document: Json, index: object) -> bool:
 
 
 def _need(document: Json, index: int, use: BakedUse | None, ao_texture: dict[int, int]) -> tuple[int, int]:
-    """Return a material's change for one primitive: (AO texture or -1, new number of uv set 1 or -1)."""
+    """Return the change of a material that a primitive needs.
+
+    The change is (index of the AO texture, new TEXCOORD number of the old set 1), each -1 for no change.
+    """
     if use is None:
         return _UNCHANGED
     texture = ao_texture.get(use.page, -1)
@@ -176,7 +181,7 @@ def _texcoord(info: Json) -> int:
 
 
 def _texture_infos(node: Json, *, occlusion: bool) -> Iterator[Json]:
-    """Yield every texture info of a material and its extensions."""
+    """Yield every texture info of a material and its extensions, occlusion textures only if `occlusion`."""
     for key, value in node.items():
         if isinstance(value, dict) and key != "extras" and (occlusion or key != "occlusionTexture"):
             if isinstance(value.get("index"), int):

@@ -1,7 +1,7 @@
 """Imports Wavefront OBJ scenes with their MTL libraries, with the parser of tinyobjloader.
 
-Each object or group becomes a mesh with one instance; the mesh has one primitive for each material. v = 0 is
-the last image row in OBJ, and the first in glTF and here, so the importer replaces v by 1 - v.
+Each object or group becomes a mesh with one instance. The mesh has one primitive for each material. In OBJ,
+v = 0 is the last image row. In glTF and in `Scene` it is the first, so the importer replaces v by 1 - v.
 """
 
 from __future__ import annotations

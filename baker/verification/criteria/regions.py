@@ -39,7 +39,7 @@ def evaluate(data: ChannelData) -> CriterionResult:
             members.append((name, np.flatnonzero(inside & (level == number))))
             keys[name] = int(room), [low, high]
     groups = make_groups(data, members)
-    # Exclude surface outside rooms (hidden) from the metrics; the table includes it.
+    # Exclude hidden surface, which is outside rooms, from the metrics. The table includes it.
     in_rooms = [group for group in groups if keys[group.name][0] >= 0]
     worst, remarks = worst_metrics("region", in_rooms, data.channel)
     position = points.position + data.geometry.origin
