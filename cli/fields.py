@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
-# `field` is a pydantic FieldInfo. It is annotated as Any, because only `core.settings_model` imports
+# `field` is a pydantic FieldInfo. It is annotated as Any, because only `baker.core.settings_model` imports
 # pydantic.
 
 

@@ -64,7 +64,10 @@ class FillRays(Protocol):
 
 
 class LightJson(Protocol):
-    """The JSON object of a light in KHR_lights_punctual, as `read` gets it; see `io.gltf.json.JsonObject`."""
+    """The JSON object of a light in KHR_lights_punctual, the argument of `read`.
+
+    `baker.io.gltf.json.JsonObject` implements this interface.
+    """
 
     def __contains__(self, key: str) -> bool:
         """Return whether the object has the member `key`."""

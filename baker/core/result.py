@@ -102,7 +102,7 @@ def picture_uri(linear: NDArray[np.float32]) -> str:
 
 
 def _png(pixels: NDArray[np.uint8]) -> bytes:
-    """Return the PNG file of pixels (H, W, 3) uint8. `core` must not import `io.png`."""
+    """Return the PNG file of pixels (H, W, 3) uint8. `core` must not import `baker.io.png`."""
     height, width = pixels.shape[:2]
     rows = np.zeros((height, 1 + 3 * width), np.uint8)
     rows[:, 1:] = pixels.reshape(height, -1)

@@ -1,7 +1,7 @@
 """The scene that is baked: immutable arrays in metres, +Y up, linear Rec.709.
 
-Importers create it. Meshes are in object space and shared by instances; `core.geometry` transforms them to
-world space.
+Importers create it. Meshes are in object space and shared by instances; `baker.core.geometry` transforms them
+to world space.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ class Instance:
 
 @dataclass(frozen=True)
 class PunctualLight:
-    """A light without area; its kind is described in `core.light_kind` and `baker.lights.kinds`.
+    """A light without area; its kind is described in `baker.core.light_kind` and `baker.lights.kinds`.
 
     Attributes
     ----------

@@ -2,8 +2,8 @@
 
 A texel buffer has n entries. Entries 0 to n_front - 1 are the front sides, one for each texel of the pages.
 Then follow the back sides of texels on double-sided surfaces. If another surface passes through a texel,
-`radiosity.sides` splits it and appends an entry for each further side. Only front entries are stored in maps;
-all entries take part in light transport.
+`baker.radiosity.sides` splits the texel and appends an entry for each further side. Only front entries are
+stored in maps. All entries take part in light transport.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class TexelBuffer:
     back_entry : (n_front,) int32
         Entry of the back side of each front texel, or -1.
     region : (n_front,) int32
-        Index of a connected part of the chart that no other surface cuts, see `radiosity.sides`. If no
+        Index of a connected part of the chart that no other surface cuts, see `baker.radiosity.sides`. If no
         surface cuts the chart, it is the index of the chart.
     """
 
@@ -82,7 +82,7 @@ class TexelBuffer:
 
         Pixels without an entry have the value `fill`. If the buffer has back sides, P * H * W rows with the
         values of the pixels' back entries follow. The index of a row is the result of
-        `kernels.triangle_lookup.hit_pixel`.
+        `baker.kernels.triangle_lookup.hit_pixel`.
 
         value : (n, ...), values of all entries
         """

@@ -20,7 +20,7 @@ from baker.pipeline.bake import bake
 
 
 class DistributedJobExecutor:
-    """Runs one bake at a time on each worker of a cluster; implements `jobs.executor.JobExecutor`.
+    """Runs one bake at a time on each worker of a cluster; implements `baker.jobs.executor.JobExecutor`.
 
     Parameters
     ----------

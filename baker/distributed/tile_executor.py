@@ -28,7 +28,7 @@ _POLL = 0.02
 
 
 class DistributedTileExecutor:
-    """Runs tiles on the workers of a cluster; implements `core.executor.TileExecutor`.
+    """Runs tiles on the workers of a cluster; implements `baker.core.executor.TileExecutor`.
 
     Parameters
     ----------

@@ -54,7 +54,7 @@ def check_output(out: Path, sha256: str, settings: BakeSettings) -> Freshness:
     out : Path
         The output folder; need not exist.
     sha256 : str
-        Hash of the scene and of the files that it refers to; see `io.scene_hash`.
+        Hash of the scene and of the files that it refers to; see `baker.io.scene_hash`.
     settings : BakeSettings
         Settings of the bake.
 

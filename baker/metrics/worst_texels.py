@@ -46,7 +46,7 @@ def worst_texels(
     Returns
     -------
     list of dict
-        One entry for each texel, as in the JSON of `verify`, the largest error first.
+        One entry for each texel, as `baker verify --json` prints it. The largest significant error is first.
     """
     found = []
     for name, check in channels.items():

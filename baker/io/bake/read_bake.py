@@ -43,7 +43,7 @@ class StoredBake:
         of an instance form one chart, whose number is the index of the instance.
     maps : dict of str to (P, H, W, C) float32
         For each channel, P pages of H x W texels with C components.
-    status : (P, H, W) uint8, `core.lightmap.TexelStatus`
+    status : (P, H, W) uint8, `baker.core.lightmap.TexelStatus`
     warnings : tuple of SceneWarning
         One warning for each file that changed or disappeared since the bake.
     """

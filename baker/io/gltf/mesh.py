@@ -1,7 +1,7 @@
 """Reads the primitives of a glTF mesh: triangles, strips and fans, with or without indices.
 
 Positions are in object space, and triangles have the winding of the file. A node whose matrix has a negative
-determinant reverses the winding in world space (glTF 2.0, section 3.7.4); `core.geometry` does that.
+determinant reverses the winding in world space (glTF 2.0, section 3.7.4); `baker.core.geometry` does that.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Criteria of a verification. Each file detects one kind of fault, with the interface of `criterion`."""
+"""Criteria of a verification. Each file detects one kind of fault and implements `criterion.Criterion`."""
