@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from baker.cli.bake_plan import BakePlan
 from baker.cli.command import Cluster, Run, command
 from baker.core.settings import BAKE, BakeSettings
 from baker.core.settings_model import FILES
@@ -37,9 +38,11 @@ def bake_command(
         from baker.trace.numba_start import skip_blas
 
         skip_blas()
+        from baker.checks.stage_seconds import stage_seconds
         from baker.io.bake.lock import held
         from baker.pipeline.bake import bake
 
+        progress.follow(BakePlan(stage_seconds(settings, scene)))
         # Exclude the objects that exist now from garbage collection. It took 4 % of the time of a first bake,
         # which compiles kernels.
         gc.freeze()

@@ -122,6 +122,10 @@ class FlagStream:
         """Write a text in which settings between backticks are converted to flags."""
         return self._stream.write(in_flags(printable_lines(text)))
 
+    def isatty(self) -> bool:
+        """Return whether the stream is a terminal."""
+        return self._stream.isatty()
+
     def flush(self) -> None:
         """Flush the stream."""
         self._stream.flush()

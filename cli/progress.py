@@ -9,7 +9,9 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TextIO
 
+from baker.cli.bake_plan import BakePlan
 from baker.core.printable import printable
+from baker.core.stage import COMPILING, Stage
 
 if TYPE_CHECKING:
     from rich.progress import Progress as RichProgress
@@ -52,6 +54,7 @@ class Reporter:
         self._last_line = clock()
         self._bar: RichProgress | None = None
         self._task: Any = None
+        self._plan: BakePlan | None = None
 
     def __enter__(self) -> Reporter:
         if not self._quiet and self._stream.isatty():
@@ -74,7 +77,36 @@ class Reporter:
                 self._show(stage, min(max(fraction, 0.0), 1.0), printable(detail))
         return self._stopped()
 
+    def follow(self, plan: BakePlan) -> None:
+        """Show the progress of a whole bake from now on, instead of that of each stage."""
+        self._plan = plan
+        if self._bar is not None:
+            if self._task is not None:
+                self._bar.remove_task(self._task)
+            self._task = self._bar.add_task("bake", total=1.0, detail="", left="")
+
     def _show(self, stage: str, fraction: float, detail: str) -> None:
+        if self._plan is None:
+            self._show_stage(stage, fraction, detail)
+        else:
+            self._show_bake(self._plan, stage, fraction, detail)
+
+    def _show_bake(self, plan: BakePlan, stage: str, fraction: float, detail: str) -> None:
+        """Show the progress of the bake, and the stage beside it."""
+        compiling = stage == Stage.COMPILE or detail == COMPILING
+        share, left = plan.update(stage, fraction, compiling=compiling)
+        words = COMPILING if stage == Stage.COMPILE else f"{stage}  {detail}".strip()
+        now = self._clock()
+        if self._bar is not None:
+            shown = "" if left is None else f"{_duration(left)} left"
+            self._bar.update(self._task, completed=share, detail=words, left=shown)
+        elif now - self._last_line >= PLAIN_INTERVAL:
+            self._last_line = now
+            shown = "" if left is None else f"{left:.0f} s left"
+            self._write_line([f"bake: {100 * share:.0f} %", words, shown])
+
+    def _show_stage(self, stage: str, fraction: float, detail: str) -> None:
+        """Show the progress of a stage."""
         now = self._clock()
         fresh = stage != self._stage
         if fresh:
@@ -83,27 +115,42 @@ class Reporter:
             if fresh:
                 if self._task is not None:
                     self._bar.remove_task(self._task)
-                self._task = self._bar.add_task(stage, total=1.0, detail=detail)
-            self._bar.update(self._task, completed=fraction, detail=detail)
+                self._task = self._bar.add_task(stage, total=1.0, detail=detail, left="")
+            shown = _duration((now - self._started) * (1 - fraction) / fraction) if fraction > 0 else ""
+            self._bar.update(
+                self._task, completed=fraction, detail=detail, left=f"{shown} left" if shown else ""
+            )
         elif now - self._last_line >= PLAIN_INTERVAL:
             self._last_line = now
             spent = now - self._started
             left = f"{spent * (1 - fraction) / fraction:.0f} s left" if fraction > 0 and spent > 0 else ""
-            words = [f"{stage}:", f"{100 * fraction:.0f} %", detail, left]
-            self._stream.write("  ".join(word for word in words if word) + "\n")
-            self._stream.flush()
+            self._write_line([f"{stage}:", f"{100 * fraction:.0f} %", detail, left])
+
+    def _write_line(self, words: list[str]) -> None:
+        self._stream.write("  ".join(word for word in words if word) + "\n")
+        self._stream.flush()
+
+
+def _duration(seconds: float) -> str:
+    """Return a duration as minutes and seconds, or with hours: 0:42, 1:02:00."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
 
 
 def _make_bar(stream: TextIO) -> RichProgress:
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+    from rich.table import Column
 
+    # Only the last column is cut if the terminal is narrow.
+    cut = Column(no_wrap=True, overflow="ellipsis")
     return Progress(
-        TextColumn("{task.description:<14}"),
-        BarColumn(),
+        TextColumn("{task.description}", table_column=Column(no_wrap=True), markup=False),
+        BarColumn(20),
         TaskProgressColumn(),
-        TextColumn("{task.fields[detail]}", markup=False),
-        TimeRemainingColumn(),
+        TextColumn("{task.fields[left]}", table_column=Column(no_wrap=True)),
+        TextColumn("{task.fields[detail]}", table_column=cut, markup=False),
         console=Console(file=stream),
         transient=True,
     )

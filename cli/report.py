@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import shlex
+import shutil
+import textwrap
 from typing import TYPE_CHECKING, Any, TextIO
+
+from baker.cli.flags import in_flags
 
 if TYPE_CHECKING:
     from baker.core.lightmap import BakeResult
@@ -18,7 +23,9 @@ def bake_json(result: BakeResult) -> dict[str, Any]:
 
 
 def write_summary(result: BakeResult, stream: TextIO, *, verbose: int = 0) -> None:
-    """Write the names and sizes of the files, the duration of each stage, and the warnings.
+    """Write files and exports, the duration of each stage, the warnings, and the commands to run next.
+
+    On a terminal, lines are wrapped between words. Elsewhere each message is one line.
 
     Parameters
     ----------
@@ -35,22 +42,38 @@ def write_summary(result: BakeResult, stream: TextIO, *, verbose: int = 0) -> No
         for path in sorted(result.out.iterdir()):
             if path.is_file():
                 stream.write(f"  {path.name:<24} {_size(path.stat().st_size)}\n")
+        for name in manifest["settings"].get("export", ()):
+            stream.write(f"  {name + '/':<24} files for {name}; see {name}/README.md\n")
     timings: dict[str, float] = manifest["timings"]
     stages = [f"{stage} {seconds:.2f}" for stage, seconds in timings.items() if stage != "total"]
     total = timings.get("total", sum(timings.values()))
-    stream.write(f"{total:.2f} s: {', '.join(stages)}\n")
+    _write_line(f"{total:.2f} s: {', '.join(stages)}", stream)
     if verbose:
         for channel, figures in manifest["statistics"].items():
             words = ", ".join(
                 f"{key} {value:.6g}" for key, value in figures.items() if isinstance(value, int | float)
             )
-            stream.write(f"{channel}: {words}\n")
-        stream.write(
-            "rays: " + ", ".join(f"{stage} {count:,}" for stage, count in manifest["rays"].items()) + "\n"
-        )
+            _write_line(f"{channel}: {words}", stream)
+        rays = ", ".join(f"{stage} {count:,}" for stage, count in manifest["rays"].items())
+        _write_line(f"rays: {rays}", stream)
     for warning in manifest["warnings"]:
         where = f"{warning['object']}: " if warning.get("object") else ""
-        stream.write(f"warning: {where}{warning['message']} [{warning['code']}]\n")
+        _write_line(f"warning: {where}{warning['message']} [{warning['code']}]", stream)
+    if result.out is not None:
+        out = shlex.quote(str(result.out))
+        # Keep these lines as they are, so that they can be copied.
+        stream.write(f"look at it:         baker view {out}\n")
+        stream.write(f"measure its error:  baker verify {out}\n")
+
+
+def _write_line(text: str, stream: TextIO) -> None:
+    """Write a text. If the stream is a terminal, wrap it between words."""
+    if stream.isatty():
+        width = max(shutil.get_terminal_size().columns, 20)
+        text = textwrap.fill(
+            in_flags(text), width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
+        )
+    stream.write(text + "\n")
 
 
 def _size(count: int) -> str:

@@ -99,7 +99,8 @@ def rates_beside(scene: Path) -> Rates | None:
     returned if no such bake is found.
     """
     found: list[tuple[str, str, Rates]] = []
-    with contextlib.suppress(OSError):
+    # A loop of links is a RuntimeError.
+    with contextlib.suppress(OSError, ValueError, RuntimeError):
         for folder in sorted(scene.resolve().parent.iterdir())[:_MOST_FOLDERS]:
             path = folder / MANIFEST_NAME
             # Skip unreadable manifests: the user did not name these folders.

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from enum import StrEnum
 
+# Detail of progress reports while kernels are compiled, which only the first run after an install does.
+COMPILING = "compiling kernels, first run only"
+
 
 class Stage(StrEnum):
     """A step of work that reports its progress.

@@ -83,12 +83,14 @@ def bake(
     """
     channels = chosen_channels(settings.channels)
     folder = _folder(out, scene, settings, channels, force)
-    record, compiling = Record(progress), precompile.start()
+    compiling = precompile.start()
+    record = Record(precompile.labelled(compiling, progress))
     with memory_errors():
         scene = _load(scene, settings, record)
         if atlas is not None:
             settings = settings_of_atlas(scene, atlas, settings)
         compiling = precompile.restart_for_materials(compiling, scene)
+        record.progress = precompile.labelled(compiling, progress)
         atlas = _layout(scene, atlas, settings, record)
         traced = _trace(scene, atlas, settings, channels, record, executor or LocalTileExecutor(), compiling)
         precompile.finish(compiling, progress)

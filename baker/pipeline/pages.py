@@ -12,8 +12,8 @@ from baker.channels.channel import Channel, Layer, Transport, make_lightmap
 from baker.core.atlas import Atlas
 from baker.core.lightmap import BakeResult, TexelStatus
 from baker.core.parallel import thread_count
-from baker.core.progress import Progress
-from baker.core.scene import Scene
+from baker.core.progress import Progress, report
+from baker.core.scene import Scene, SceneWarning
 from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
 from baker.core.texels import TexelBuffer
@@ -29,6 +29,8 @@ from baker.pipeline.record import Record
 
 # Relative standard error before denoising above which a texel gets the status UNCONVERGED.
 UNCONVERGED = 0.25
+# Share of the texels with that status above which there is a warning.
+UNCONVERGED_SHARE = 0.01
 
 
 class TracedTexels(NamedTuple):
@@ -89,6 +91,7 @@ def finish_pages(
     flat = status.reshape(-1)
     flat[texels.pixel[:n_front][noisy & valid]] = TexelStatus.UNCONVERGED
     flat[texels.pixel[:n_front][~valid]] = TexelStatus.INVALID
+    record.warnings.extend(convergence_warnings(status))
     return BakeResult(
         scene=scene,
         atlas=atlas,
@@ -103,6 +106,31 @@ def finish_pages(
         denoise=denoiser_name() if settings.denoise else {},
         warnings=tuple(record.warnings),
     )
+
+
+def convergence_warnings(status: NDArray[np.uint8]) -> list[SceneWarning]:
+    """Return a warning if many texels did not converge.
+
+    Parameters
+    ----------
+    status : (n_pages, H, W) uint8
+        `TexelStatus` of each texel.
+
+    Returns
+    -------
+    list of SceneWarning
+        Empty if at most `UNCONVERGED_SHARE` of the texels have the status UNCONVERGED.
+    """
+    count = np.bincount(status.ravel(), minlength=len(TexelStatus))
+    noisy = int(count[TexelStatus.UNCONVERGED])
+    surface = noisy + int(count[TexelStatus.COVERED]) + int(count[TexelStatus.INVALID])
+    if noisy <= UNCONVERGED_SHARE * surface:
+        return []
+    message = (
+        f"{100 * noisy / surface:.2g} % of the texels did not converge: their standard error before denoising"
+        f" is above {100 * UNCONVERGED:.0f} % of their value; raise `quality` or `samples`"
+    )
+    return [SceneWarning("not-converged", message)]
 
 
 def _finished(
@@ -131,6 +159,7 @@ def _finished(
         denoise=settings.denoise,
         progress=progress,
     ) as finisher:
+        done, steps = 0, len(status) * len(channels)
         for page in range(len(status)):
             plan = PagePlan(region[page], valid[page], centroid[page])
             for name, channel in channels.items():
@@ -138,6 +167,8 @@ def _finished(
                 rules = ComponentRules(channel.lower, channel.upper, channel.groups)
                 value[name][page], grown = finish_page(plan, images, rules, finisher)
                 status[page][grown] = TexelStatus.DILATED
+                done += 1
+                report(progress, Stage.FINISH, done / steps)
     return value
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from baker.core.parent_death import end_with_parent
 from baker.core.progress import Progress, report
 from baker.core.scene import Instance, Material, Mesh, Scene
-from baker.core.stage import Stage
+from baker.core.stage import COMPILING, Stage
 
 # Time between two polls of the process, seconds.
 _POLL = 0.1
@@ -70,6 +70,34 @@ def restart_for_materials(process: Process, scene: Scene) -> Process:
     stop(process)
     blend = any(material.alpha_mode == "BLEND" for material in passing)
     return _run("glass" if blend else "holes")
+
+
+def labelled(process: Process, progress: Progress) -> Progress:
+    """Return a callback that adds to reports that kernels are compiled, as long as the process runs.
+
+    The bake compiles its own kernels during the same time, at their first calls. Then a stage that takes a
+    fraction of a second otherwise stands still for many seconds at its beginning.
+
+    Parameters
+    ----------
+    process : Process
+        From `start` or `restart_for_materials`.
+    progress : Progress
+        Receives the reports; those at the beginning of a stage have the detail `COMPILING`.
+
+    Returns
+    -------
+    Progress
+        `progress` itself if there is no process.
+    """
+    if process is None:
+        return progress
+
+    def report_compiling(stage: str, fraction: float, detail: str = "", /) -> object:
+        compiling = fraction == 0.0 and process.poll() is None
+        return progress(stage, fraction, COMPILING if compiling else detail)
+
+    return report_compiling
 
 
 def _passes(material: Material) -> bool:
@@ -123,7 +151,7 @@ def _wait(process: Process, progress: Progress, enough: Callable[[], bool]) -> N
         try:
             process.wait(_POLL)
         except subprocess.TimeoutExpired:
-            report(progress, Stage.COMPILE, 0.5, "first run only")
+            report(progress, Stage.COMPILE, 0.5, COMPILING)
         else:
             process = None
 

@@ -20,12 +20,16 @@ import pytest
 
 import baker
 from baker.cli.app import run
+from baker.cli.bake_plan import BakePlan
 from baker.cli.commands import COMMANDS
 from baker.cli.fields import group_of
+from baker.cli.flags import FlagStream
 from baker.cli.progress import Reporter
+from baker.cli.report import write_summary
 from baker.core.encoding import encoding_options
 from baker.core.errors import Cancelled, InputError, SettingsError
 from baker.core.settings import BakeSettings
+from baker.core.stage import COMPILING
 from baker.io.bake.lock import OutputLock
 
 MANIFEST = {
@@ -283,6 +287,40 @@ def test_summary_tells_files_seconds_and_warnings(pipeline, command, tmp_path):
         assert part in out
 
 
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_summary_names_exports_and_the_next_commands(pipeline, command, tmp_path, monkeypatch):
+    monkeypatch.setitem(MANIFEST, "settings", {"export": ["three", "godot"]})
+    out = tmp_path / "my out"
+    code, text = command("bake", "scene.glb", "-o", out)
+    assert code == 0
+    assert re.search(r"^  three/ +files for three; see three/README.md$", text, re.MULTILINE)
+    assert "  godot/" in text
+    assert text.endswith(f"baker view '{out}'\nmeasure its error:  baker verify '{out}'\n")
+
+
+def test_closing_lines_are_wrapped_between_words(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "60")
+    stages = [f"stage-{k} of the bake" for k in range(9)]
+    message = "the standard error of many texels is high; raise `light_samples` or add `denoise=False`"
+    manifest = {
+        **MANIFEST,
+        "timings": dict.fromkeys(stages, 1.5),
+        "warnings": [{"code": "not-converged", "message": message}],
+    }
+    result = SimpleNamespace(manifest=manifest, out=None)
+    terminal, file = Terminal(), io.StringIO()
+    for stream in (terminal, file):
+        write_summary(result, FlagStream(stream))
+    assert max(map(len, terminal.getvalue().splitlines())) <= 60
+    assert terminal.getvalue().split() == file.getvalue().split()
+    assert "raise --light-samples or add --no-denoise [not-converged]\n" in file.getvalue()
+    assert file.getvalue().count("\n") == 2
+
+
 def test_quiet_says_nothing(pipeline, command, tmp_path, capsys):
     assert command(*bake_words(tmp_path, "-q")) == (0, "")
     assert capsys.readouterr().err == ""
@@ -325,7 +363,7 @@ def test_python_m_baker_is_the_command():
 def test_the_project_has_a_name_of_its_own_and_one_command():
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8"))["project"]
     assert project["name"] == "baker-lightmaps"
-    assert project["scripts"] == {"baker": "baker.cli.app:main"}
+    assert list(project["scripts"]) == ["baker"]
 
 
 def test_help_of_a_command_has_two_spellings(command, capsys):
@@ -405,10 +443,6 @@ def test_plain_progress_is_a_line_now_and_then():
 
 
 def test_terminal_gets_a_bar_with_stage_rate_and_time_left():
-    class Terminal(io.StringIO):
-        def isatty(self):
-            return True
-
     stream = Terminal()
     with Reporter(quiet=False, stopped=lambda: False, stream=stream) as reporter:
         reporter("gather", 0.25, "23.1 Mrays/s")
@@ -416,6 +450,65 @@ def test_terminal_gets_a_bar_with_stage_rate_and_time_left():
         time.sleep(0.15)
     assert "gather" in stream.getvalue() or "solve" in stream.getvalue()
     assert "50%" in stream.getvalue()
+
+
+def plan_lines(reports, expected):
+    """Return the lines that a bake prints for (seconds, stage, fraction, detail)."""
+    now, stream = [0.0], io.StringIO()
+    reporter = Reporter(quiet=False, stopped=lambda: False, stream=stream, clock=lambda: now[0])
+    with reporter:
+        reporter.follow(BakePlan(expected, clock=lambda: now[0]))
+        for seconds, stage, fraction, detail in reports:
+            now[0] = seconds
+            reporter(stage, fraction, detail)
+    return stream.getvalue().splitlines()
+
+
+def test_a_bake_has_one_progress_with_the_time_left_of_all_stages():
+    expected = {"load": 1.0, "gather": 6.0, "finish": 3.0}
+    lines = plan_lines(
+        [(4, "load", 0.5, ""), (8, "gather", 0.0, ""), (20, "gather", 0.5, "23.1 Mrays/s"),
+         (32, "finish", 0.0, ""), (35, "denoise", 0.5, ""), (40, "finish", 0.5, ""), (48, "finish", 1.0, "")],
+        expected,
+    )  # fmt: skip
+    shares = [int(re.search(r"(\d+) %", line)[1]) for line in lines]
+    assert shares == [5, 10, 40, 70, 70, 85, 100]
+    # Half of the gather took 12 s: 12 s are left of it, and finishing is expected to be as slow as loading.
+    assert lines[2].startswith("bake: 40 %  gather  23.1 Mrays/s  ")
+    left = [float(re.search(r"(\d+) s left", line)[1]) for line in lines]
+    assert 12 + 3 < left[2] <= 12 + 3 * 8
+    assert left[4] == pytest.approx(left[3] - 3, abs=1)
+    assert left[-1] == 0
+    # The bake takes 48 s. The estimate is within a factor of two from the middle on.
+    assert all(0.5 < (48 - then) / value < 2 for then, value in ((32, left[3]), (40, left[5])))
+
+
+def test_compiling_is_labelled_and_does_not_spoil_the_estimate():
+    expected = {"load": 1.0, "texels": 1.0, "gather": 8.0}
+    lines = plan_lines(
+        [(1, "load", 0.0, ""), (4, "texels", 0.0, COMPILING), (40, "compile", 0.5, COMPILING),
+         (44, "gather", 0.0, "")],
+        expected,
+    )  # fmt: skip
+    assert lines[0] == "bake: 10 %  texels  compiling kernels, first run only"
+    assert lines[1] == "bake: 10 %  compiling kernels, first run only"
+    assert 8 <= float(re.search(r"(\d+) s left", lines[2])[1]) < 20
+
+
+@pytest.mark.parametrize("width", [40, 80])
+def test_the_bar_of_a_bake_fits_the_terminal(width, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(width))
+    stream = Terminal()
+    with Reporter(quiet=False, stopped=lambda: False, stream=stream) as reporter:
+        reporter("start", 0.0)
+        reporter.follow(BakePlan({"gather": 4.0, "finish": 1.0}))
+        reporter("gather", 0.5, "23.1 Mrays/s")
+        time.sleep(0.15)
+    drawn = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", stream.getvalue()).replace("\r", "\n").splitlines()
+    bars = [line.rstrip() for line in drawn if "bake" in line]
+    assert any("40%" in line and "left" in line for line in bars), drawn
+    assert all(len(line) <= width for line in drawn)
+    assert width < 80 or bars[-1].endswith("gather  23.1 Mrays/s")
 
 
 def test_progress_answers_the_stop_flag():

@@ -1,0 +1,83 @@
+"""Expected seconds of each stage of a bake, before its scene is read, for the progress of the whole bake."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from baker.channels.channel import Channel, chosen_channels
+from baker.checks.bake_rates import Rates, rates_beside
+from baker.core.budget import Workload, texels_and_pages
+from baker.core.parallel import thread_count
+from baker.core.settings import BakeSettings
+from baker.core.stage import Stage
+
+# Seconds times threads for each ray, without an earlier bake: measured on interior.glb with 1024 texels a
+# side, see docs/PERFORMANCE.md.
+_RAY_SECONDS: Mapping[Stage, float] = {
+    Stage.INSIDE_GEOMETRY: 3.2e-7,
+    Stage.DIRECT_LIGHT: 1.2e-7,
+    Stage.FORM_FACTORS: 1.3e-6,
+    Stage.FINAL_GATHER: 1.7e-7,
+    Stage.AMBIENT_OCCLUSION: 1.7e-7,
+}
+# Seconds times threads for each texel of the stages without rays, for bakes with and without a denoiser.
+_TEXEL_SECONDS: Mapping[Stage, float] = {Stage.TEXELS: 1.5e-6, Stage.TEXEL_SIDES: 6e-7, Stage.WRITE: 2e-6}
+_FINISH_SECONDS, _DENOISE_SECONDS = 5e-6, 1e-5
+# Seconds of stages that depend on the scene, which is not yet known.
+_SCENE_SECONDS: Mapping[Stage, float] = {
+    Stage.LOAD: 0.1, Stage.UNWRAP: 1.0, Stage.RAY_TREE: 0.05, Stage.SOLVE: 0.2
+}  # fmt: skip
+# Area for which a density is assumed to need one page, as the area of the scene is not yet known, pages.
+_ASSUMED_PAGES = 1.0
+
+
+def stage_seconds(settings: BakeSettings, scene: Path) -> dict[Stage, float]:
+    """Estimate the duration of each stage of a bake.
+
+    Parameters
+    ----------
+    settings : BakeSettings
+        Settings of the bake.
+    scene : Path
+        The scene file. If a bake of it is in a folder beside it, the speed of that bake is used.
+
+    Returns
+    -------
+    dict of Stage to float
+        Seconds, in the order in which the stages run. The ratios between stages are more accurate than the
+        seconds.
+    """
+    channels = chosen_channels(settings.channels)
+    threads = thread_count(settings.threads)
+    workload = _workload(settings, channels)
+    rays = workload.rays(settings, delta_lights=1, emitters=True)
+    rates = rates_beside(scene)
+    seconds = dict(_SCENE_SECONDS)
+    for stage, count in rays.items():
+        seconds[stage] = count * _seconds_per_ray(stage, rates, threads)
+    for stage, each in _TEXEL_SECONDS.items():
+        seconds[stage] = workload.texels * each / threads
+    finish = _FINISH_SECONDS + _DENOISE_SECONDS * settings.denoise
+    seconds[Stage.FINISH] = workload.texels * (finish / threads if rates is None else rates.texel)
+    return {stage: seconds[stage] for stage in Stage if stage in seconds}
+
+
+def _seconds_per_ray(stage: Stage, rates: Rates | None, threads: int) -> float:
+    """Return the time of a ray: that of an earlier bake, if it cast rays in this stage."""
+    default = _RAY_SECONDS[stage] / threads
+    return default if rates is None else rates.ray.get(stage, default)
+
+
+def _workload(settings: BakeSettings, channels: Mapping[str, Channel]) -> Workload:
+    """Return the size of a bake of a scene of which nothing is known."""
+    area = 0.0 if settings.density is None else _ASSUMED_PAGES * (settings.resolution / settings.density) ** 2
+    texels, pages = texels_and_pages(settings, area)
+    return Workload(
+        texels=texels,
+        pages=pages,
+        triangles=0,
+        image_bytes=(0, 0),
+        light=any(channel.needs_light for channel in channels.values()),
+        ambient_occlusion=any(channel.needs_ambient_occlusion for channel in channels.values()),
+    )
