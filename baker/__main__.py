@@ -1,5 +1,5 @@
 """Runs the command `baker` for `python -m baker`."""
 
-from baker.cli.app import main
+from baker.cli.start import main
 
 main()
