@@ -32,7 +32,7 @@ _SCENE_SECONDS: Mapping[Stage, float] = {
 _ASSUMED_PAGES = 1.0
 
 
-def stage_seconds(settings: BakeSettings, scene: Path) -> dict[Stage, float]:
+def stage_seconds(settings: BakeSettings, scene: Path) -> dict[str, float]:
     """Estimate the duration of each stage of a bake.
 
     Parameters
@@ -44,8 +44,8 @@ def stage_seconds(settings: BakeSettings, scene: Path) -> dict[Stage, float]:
 
     Returns
     -------
-    dict of Stage to float
-        Seconds, in the order in which the stages run. The ratios between stages are more accurate than the
+    dict of str to float
+        Seconds by name of the stage, in the order in which the stages run. The ratios between stages are more accurate than the
         seconds.
     """
     channels = chosen_channels(settings.channels)
