@@ -45,8 +45,8 @@ def stage_seconds(settings: BakeSettings, scene: Path) -> dict[str, float]:
     Returns
     -------
     dict of str to float
-        Seconds by name of the stage, in the order in which the stages run. The ratios between stages are more accurate than the
-        seconds.
+        Seconds by name of the stage, in the order in which the stages run. The ratios between stages are
+        more accurate than the seconds.
     """
     channels = chosen_channels(settings.channels)
     threads = thread_count(settings.threads)
