@@ -6,8 +6,8 @@
 3. The change of each texel is limited by the standard error of its samples, see
    `baker.finish.kernels.page_guard`.
 
-Direct and indirect light are denoised separately and then added. *Measured* at a sharp shadow edge over noisy
-indirect light, RMS error:
+Direct and indirect light are denoised separately and then added. *Measured* RMS error at a sharp shadow edge
+of direct light, with noisy indirect light:
 
     noise of direct and of indirect light | texels        | denoised as a sum | denoised separately
     0 and 5 %                             | all           | 1.5 %             | 0.9 %
@@ -15,7 +15,8 @@ indirect light, RMS error:
     10 and 20 %                           | all           | 4.0 %             | 3.0 %
     10 and 20 %                           | at the edge   | 7.7 %             | 4.8 %
 
-*Measured* on the outermost ring of texels of charts, with 20 % noise and contact shadows:
+*Measured* on the outermost ring of texels of charts, with 20 % noise and contact shadows, by the values with
+which empty texels are filled:
 
     content of empty texels               | RMS error | mean error
     black                                 |           | -16 %
@@ -23,8 +24,9 @@ indirect light, RMS error:
     reflection                            | 8.7 %     | +2.7 %
     reflection times the fitted plane     | 6.1 %     | +0.2 %
 
-*Measured* on AO with 256 rays, RMS error divided by the mean. The standard error is the binomial one, or the
-binomial one lowered to the noise estimated from the page:
+*Measured* on AO with 256 rays: RMS error divided by the mean, by scene and by the standard error that limits
+the change. "Binomial" is the binomial standard error, and "lowered" is this error lowered to the noise
+estimated from the page.
 
     scene                                 | not denoised | binomial | lowered
     hall                                  | 0.0080       | 0.0095   | 0.0067
@@ -32,7 +34,7 @@ binomial one lowered to the noise estimated from the page:
     interior                              |              | 0.0061   | 0.0056
     Cornell                               |              | 0.0022   | 0.0029
 
-If the standard error is too large, the filter blurs contact shadows.
+With a standard error that is too large, the filter blurs contact shadows.
 
 Based on: Afra, Intel Open Image Denoise, 2019-2026 (filter RTLightmap).
 """
@@ -57,23 +59,24 @@ from baker.finish.tiles import over_rows
 
 __all__ = ["denoise_page", "denoiser_name", "surround_charts"]
 
-# Largest distance over which charts are reflected, texels: the radius of the filter (its tile overlap).
+# Largest distance between an empty texel's nearest covered texel and its mirror texel, texels. It is the
+# radius of the filter (its tile overlap).
 REACH = 96
-# Smallest number of mirrored texels at each side of the image, and the number of which the extended sides are
-# multiples. The filter shifts the colour of the outermost texels, and more so if it pads its blocks of 16
-# itself. RMS error of the outermost 8 texels on pages of 225 to 240 texels a side, grey with 5 % noise:
-# 0.37 to 0.38 % with these values, 0.36 to 0.41 % with a fixed margin of 16.
+# MARGIN: smallest number of mirrored texels at each side of the image. BLOCK: the sides of the extended image
+# are multiples of it. The filter shifts the colour of the outermost texels, and shifts it more if it pads its
+# blocks of 16 itself. On grey pages of 225 to 240 texels a side with 5 % noise, the RMS error of the
+# outermost 8 texels was 0.37 to 0.38 % with these values, and 0.36 to 0.41 % with a fixed margin of 16.
 MARGIN, BLOCK = 8, 16
 # Half side of the window to which planes are fitted at chart borders, texels.
 SLOPE_RADIUS = 4
 # Number of border texels for which one call of the kernel fits planes.
 _BORDER_TEXELS = 4096
-# Largest ratio of an upper bound of the error to the noise estimated from the page, RMS over the page: larger
-# bounds are scaled down to it. The error of AO is 0.95 to 1.2 times that noise (Cornell, interior, hall; 16
-# to 256 rays).
+# Largest ratio of an upper bound of the standard error to the noise estimated from the page, both RMS over
+# the page. Larger bounds are scaled down to this ratio. The true error of AO is 0.95 to 1.2 times the
+# estimated noise (scenes Cornell, interior and hall; 16 to 256 rays).
 FITTED = 1.2
-# Largest ratio of a chart's mean luminance to the page's median, or its inverse: beyond it, the chart is
-# scaled to the median before filtering.
+# Largest ratio of a chart's mean luminance to the page's median, or of the median to the mean. Beyond it, the
+# chart is scaled to the median before filtering.
 LEVEL = 8.0
 LUMINANCE = np.array(LUMINANCE_WEIGHTS, np.float32)
 
@@ -94,14 +97,14 @@ def denoise_page(
     Parameters
     ----------
     value : (H, W, C) float32
-        Linear light, C = 3, or C = 1 (filtered as grey). The caller has filled invalid texels.
+        Linear light; C = 3, or C = 1, which is filtered as grey. Invalid texels must have been filled.
     covered : (H, W) bool
         Texels to denoise.
     chart : (H, W) int32
         Index of the chart of each covered texel.
     standard_error : (H, W) float32, optional
         Standard error of each texel's mean luminance (if C = 1, of its value), in the unit of `value`. It
-        limits the change of a texel. If it is None, it is estimated from the page.
+        limits the change of a texel. None means that it is estimated from the page.
     bound : bool
         Whether `standard_error` is an upper bound. If so, it is lowered to at most `FITTED` times the noise
         estimated from the page.
@@ -111,7 +114,7 @@ def denoise_page(
         Filter that keeps its memory for further pages. The kernels run on as many threads as the filter. By
         default, a filter with one thread is created for this call.
     progress : Progress
-        Gets the share that the filter has done; may cancel.
+        Called with the fraction that the filter has done; a truthy return value cancels.
 
     Returns
     -------
@@ -181,8 +184,8 @@ def _filter_window(
 
     charts : (h, w) int32; inside : (h, w) bool, covered texels
     """
-    # Scale very dark and very bright charts to the median: the filter treats a room with a millionth of the
-    # page's light as black.
+    # Scale very dark and very bright charts to the median, because the filter treats charts with a millionth
+    # of the page's light as black.
     level = _levels(np.abs(noisy) if signed else noisy, charts, inside)
     picture = surround_charts(noisy / level, inside, charts, threads=denoiser.threads)
     rows, columns = (_margins(side) for side in inside.shape)
@@ -200,7 +203,7 @@ def _margins(side: int) -> tuple[int, int]:
 def _levels(
     value: NDArray[np.float32], chart: NDArray[np.int32], covered: NDArray[np.bool_]
 ) -> NDArray[np.float32]:
-    """Return (H, W, 1) float32: the divisor of each texel's chart, 1 if the ratio is within `LEVEL`.
+    """Return (H, W, 1) float32: the divisor of each texel's value, 1 if its chart is within `LEVEL`.
 
     value : (H, W, 3) float32; chart : (H, W) int32; covered : (H, W) bool
     """
@@ -211,7 +214,7 @@ def _levels(
     level = np.ones((*chart.shape, 1), np.float32)
     lit = np.flatnonzero(mean > 0.0)
     if len(lit):
-        # Compute the median over lit texels of the mean luminance of their chart.
+        # Compute the median, over the texels of lit charts, of the mean luminance of the texel's chart.
         order = lit[np.argsort(mean[lit], kind="stable")]
         middle = mean[order[np.searchsorted(np.cumsum(count[order]), 0.5 * count[order].sum())]]
         ratio = np.where(mean > 0.0, mean / middle, 1.0)
@@ -291,8 +294,8 @@ def surround_charts(
 
 
 def _window(covered: NDArray[np.bool_]) -> tuple[slice, slice]:
-    # Return rows and columns of the smallest rectangle that contains all charts. The last page of an atlas is
-    # often nearly empty.
+    # Return rows and columns of the smallest rectangle that contains all charts. It saves time on the last
+    # page of an atlas, which is often nearly empty.
     rows = np.flatnonzero(covered.any(axis=1))
     columns = np.flatnonzero(covered.any(axis=0))
     return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)

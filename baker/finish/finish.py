@@ -21,21 +21,25 @@ from baker.finish.oidn import LightmapDenoiser
 from baker.finish.packing import pack_charts
 from baker.finish.texel_centre import recentre
 
-# RMS relative noise of a brightness band below which its texels are not denoised. The filter hardly reduces
-# so small an error (Cornell, 64 samples, median error: 0.33 % with it, 0.35 % without).
+# RMS relative noise of a brightness band, see `BAND`. Up to it, the texels of the band are not denoised,
+# because the filter hardly reduces such small errors. In the scene Cornell with 64 samples, the median error
+# was 0.33 % with the filter and 0.35 % without.
 NOT_WORTH_FILTERING = 0.02
-# Width of a brightness band: ratio of the largest to the smallest mean light of the charts in it. Number of
-# texels below which a band is not denoised.
+# BAND: width of a brightness band, the ratio of the largest to the smallest mean light of its charts or
+# blocks.
+# FEWEST: number of texels of a band. Below it, the band is not denoised.
 BAND = 8.0
 FEWEST = 64
-# Ratio of the arithmetic to the geometric mean of a chart's light: charts above it are split into blocks,
-# each of which is assigned to its own brightness band.
+# Ratio of the arithmetic to the geometric mean of a chart's light. Above it, the chart is split into blocks,
+# and each block is assigned to a brightness band separately.
 UNEVEN = 2.5
-# Smallest mean light, as a share of that of the brightest chart or block: darker means are raised to it.
+# Mean light of a chart or block, as a share of the mean light of the brightest one. Darker means are raised
+# to it.
 BLACK = 1e-10
-# RMS relative noise below which a chart is not filtered.
+# RMS relative noise of a chart. Up to it, the chart is not denoised.
 QUIET = 0.002
-# Texels of the packed page divided by the covered texels of the page: above it, charts are not packed.
+# Number of texels of the packed page divided by the number of covered texels of the page. Above it, charts
+# are not packed for the filter.
 SMALLER = 0.9
 # Side of a block of an uneven chart, texels.
 BLOCK = 16
@@ -48,9 +52,9 @@ class PagePlan:
     Attributes
     ----------
     chart : (H, W) int32
-        Index of the chart of each texel, -1 = empty.
+        Index of the chart of each texel, -1 for empty texels.
     valid : (H, W) bool
-        Covered texels with a valid point.
+        Covered texels with a valid point, which is a point that is not inside geometry.
     centroid : (H, W, 2) float32
         Centroid of the covered part of each texel minus the texel centre (column, row), texels.
     """
@@ -74,11 +78,13 @@ class PagePlan:
 
 
 class PageLayer(NamedTuple):
-    """One summand of a page, such as direct light. Each summand is denoised separately.
+    """One layer of a page, such as direct light.
+
+    The page is the sum of its layers, which are denoised separately.
 
     value : (H, W, C) float32
-    error : (H, W) float32, standard error of the mean of all components; or (H, W, G) float32, standard error
-        of the mean of the components of each of the G groups of `ComponentRules.groups`
+    error : (H, W) or (H, W, G) float32, standard error of the mean of all components, or of the mean of the
+        components in each of the G groups of `ComponentRules.groups`
     bound : bool, whether `error` is an upper bound
     kept : (H, W) bool or None, texels that are not denoised
     """
@@ -98,8 +104,8 @@ class ComponentRules:
     lower, upper : float
         Smallest and largest possible value; `lower` < 0 for signed values.
     groups : tuple of slice
-        Components that are denoised together: the three of a colour, or a single component. Signed components
-        are denoised one by one.
+        Components that are denoised together: the three components of a colour, or a single component. Signed
+        components are denoised one by one.
     """
 
     lower: float
@@ -114,8 +120,8 @@ class ComponentRules:
     def clip(self, value: NDArray[np.float32], like: NDArray[np.float32] | None = None) -> None:
         """Clip `value` (H, W, C) in place to the bounds.
 
-        If `like` (H, W, C) is given, each component is also clipped to the largest value of that component in
-        `like` and, if that component has negative values, to the smallest.
+        If `like` (H, W, C) is given, each component is also clipped to the range of that component in `like`,
+        extended to include 0.
         """
         lower, upper = np.float32(self.lower), np.float32(self.upper)
         if like is None:
@@ -138,7 +144,7 @@ class Finisher:
     dilation : int
         Texels by which charts are dilated into the padding.
     denoiser : LightmapDenoiser or None
-        None: layers are not denoised.
+        The denoiser; None if layers are not denoised.
     progress : Progress
         Gets the denoiser's progress; may cancel.
     """
@@ -231,15 +237,14 @@ def _denoised(
 ) -> NDArray[np.float32]:
     """Return (H, W, C) float32: a layer without invalid texels, after denoising its noisy charts.
 
-    `keep_light` is not applied to signed components, because relative changes of a sum near 0 are
-    meaningless.
+    `finish.keep_light` restores the light that the filter removed. It is not applied to signed components,
+    because relative changes of a sum near 0 are meaningless.
     """
     denoiser = finisher.denoiser
     worth = _worth_filtering(plan, _mean_error(layer, rules), light) if denoiser else None
     if denoiser is None or worth is None:
         return layer.value
-    # Set the error of invalid texels to 0: they were filled from neighbours, and their own error is
-    # unrelated.
+    # Set the error of invalid texels to 0, because the error belongs to the value that was replaced.
     valid = plan.valid if layer.error.ndim == 2 else plan.valid[..., None]
     noisy = layer._replace(error=np.where(valid, layer.error, np.float32(0.0)))
     chosen = plan.covered & worth[plan.chart]
@@ -259,7 +264,8 @@ def _filter_groups(
 ) -> NDArray[np.float32]:
     """Return (H, W, C) float32: the layer after denoising the chosen charts, one component group at a time.
 
-    If the chosen charts fit on a sufficiently smaller page (`SMALLER`), they are packed on it first.
+    If the chosen charts fit on a sufficiently smaller page (see `SMALLER`), they are first packed on that
+    page.
 
     chart : (H, W) int32; chosen : (H, W) bool, all texels of the chosen charts
     """
@@ -307,7 +313,9 @@ def _mean_error(layer: PageLayer, rules: ComponentRules) -> NDArray[np.float32]:
 class _Light(NamedTuple):
     """Brightness and group of the n valid texels of a page.
 
-    texel : (n,) float64, brightness; group : (n,) int64, index of a chart, or of a block of an uneven chart
+    A group is a chart, or a block of a chart of uneven brightness (see `UNEVEN`).
+
+    texel : (n,) float64, brightness; group : (n,) int64, number of the group
     """
 
     texel: NDArray[np.float64]
@@ -317,8 +325,8 @@ class _Light(NamedTuple):
 def _light(plan: PagePlan, layers: list[PageLayer], rules: ComponentRules) -> _Light:
     """Return brightness and group of the valid texels of the sum of all layers.
 
-    Brightness is the mean of the components, or of their absolute values if they are signed. It is raised to
-    at least a tenth of the mean brightness of the texel's group.
+    Brightness is the mean of the components or, if they are signed, of their absolute values. If it is less
+    than a tenth of the mean brightness of the texel's group, it is raised to this value.
     """
     total = np.zeros(int(plan.valid.sum()))
     for layer in layers:
@@ -339,9 +347,10 @@ def _light(plan: PagePlan, layers: list[PageLayer], rules: ComponentRules) -> _L
 def _worth_filtering(plan: PagePlan, error: NDArray[np.float32], light: _Light) -> NDArray[np.bool_] | None:
     """Return (n_charts,) bool: the charts to filter, or None if no brightness band is noisy.
 
-    Noise is averaged over bands of groups with similar brightness. Relative to the mean of the page, the
-    noise of a dim room beside sunlit ground would be negligible. Charts without noise are excluded, because
-    the filter derives its exposure from all texels of its input.
+    Relative noise is averaged over brightness bands, which are sets of groups with similar brightness. If
+    noise were divided by the mean of the whole page instead, the noise of a dim room beside sunlit ground
+    would seem negligible. Charts without noise are excluded, because the filter derives its exposure from all
+    texels of its input.
 
     error : (H, W) float32, standard error of each texel's brightness
     """

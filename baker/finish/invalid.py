@@ -1,7 +1,7 @@
 """Fills invalid texels from the valid texels of the same chart.
 
-All rays of a texel inside other geometry hit back faces, so its value is meaningless. Bilinear lookups on the
-visible surface beside it nevertheless read that value.
+An invalid texel lies inside geometry with all its points, so its value is meaningless. Bilinear lookups on
+the visible surface beside the texel nevertheless read this value.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ _RING_WEIGHTS = (0.5, 1.0, 0.5, 1.0, 1.0, 0.5, 1.0, 0.5)
 def fill_invalid(
     value: NDArray[np.float32], chart: NDArray[np.int32], valid: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float32], int]:
-    """Replace covered but invalid texels by means of their chart's valid texels.
+    """Replace the values of covered but invalid texels by means of valid texels of the same chart.
 
-    Values are propagated in rings from the valid texels outwards. Across an invalid strip between two rooms,
-    each half therefore gets the value of its own room, with no gradient between them.
+    Values are propagated from the valid texels outwards, ring by ring. If an invalid strip of a chart lies
+    between two rooms, each half of the strip therefore gets the values of the room next to it.
 
     Parameters
     ----------
     value : (H, W, C) float32
         The page.
     chart : (H, W) int32
-        Index of the chart of each covered texel, -1 = empty.
+        Index of the chart of each covered texel, -1 for empty texels.
     valid : (H, W) bool
         Covered texels with a valid point.
 
@@ -51,7 +51,7 @@ def fill_invalid(
     known = np.ascontiguousarray(valid & covered)
     if bool((known == covered).all()):
         return filled, 0
-    # Keep the values of charts without any valid texel: the solid around them may be misclassified.
+    # Keep the values of charts without any valid texel, because the solid around them may be misclassified.
     n_charts = int(chart.max()) + 1
     some = np.bincount(chart[known], minlength=n_charts) > 0
     hopeless = covered & ~known & ~some[chart]
@@ -77,14 +77,14 @@ def fill_invalid(
 
 
 def _grow_rings(value: NDArray[np.float32], chart: NDArray[np.int32], known: NDArray[np.bool_]) -> None:
-    """Fill the texels of each chart that are not `known`, ring by ring from the known ones, in place.
+    """Fill the texels of each chart that are not `known`, ring by ring from the known texels, in place.
 
-    A texel of the next ring gets the weighted mean of its known 8-neighbours of the same chart; the weight is
-    1 for edge neighbours and 1/2 for diagonal ones. The values of a ring are used only after the whole ring
-    is computed, so the result does not depend on the order of texels.
+    A texel of the next ring gets the weighted mean of its known 8-neighbours of the same chart. The weight is
+    1 for neighbours that share an edge, and 1/2 for diagonal neighbours. The values of a ring are used only
+    after the whole ring is computed, so the result does not depend on the order of texels.
 
-    value : (H, W, C) float32 and known : (H, W) bool, both changed at the texels that are filled
-    chart : (H, W) int32, -1 = empty
+    value : (H, W, C) float32, known : (H, W) bool, both changed at the texels that are filled
+    chart : (H, W) int32, -1 for empty texels
     """
     flat_chart, flat_known = chart.reshape(-1), known.reshape(-1)
     flat_value = value.reshape(-1, value.shape[2])
@@ -109,7 +109,7 @@ def _grow_rings(value: NDArray[np.float32], chart: NDArray[np.int32], known: NDA
 def _neighbours(
     texel: NDArray[np.int64], shape: tuple[int, int]
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Return the flat indices (8, n) int64 of the 8 neighbours of n texels, and (8, n) bool: on the page.
+    """Return indices (8, n) int64 of the 8 neighbours of n texels, and (8, n) bool: which are on the page.
 
     texel : (n,) int64, row * W + column; shape : (H, W) of the page
     """

@@ -1,14 +1,15 @@
 """Restores the light that the denoiser removed from a page.
 
-If few rays hit the light, most texels are too dark and a few far too bright. The filter removes these bright
-texels as outliers, so noisy rooms become too dark. The sum of the samples over many texels is unbiased, and
-its variance between seeds equals that of the sum of the filtered values. The filtered values are therefore
-scaled towards the sum of the samples in windows of 40 x 40 texels. The correction is smaller in windows with
-few chart texels, because their sums are noisy.
+If few rays hit the light, most texels are too dark, and a few are far too bright. The filter removes these
+bright texels as outliers, so surfaces with much noise become too dark. The sum of the samples over many
+texels is unbiased. Its variance between seeds equals the variance of the sum of the filtered values.
+Therefore, in windows of 40 x 40 texels, the filtered values are scaled so that their sum approaches the sum
+of the samples. The correction is smaller in windows with few texels of the chart, because their sums are
+noisy.
 
-*Measured* relative to the mean of the samples: in a cellar behind one small window (64 and 256 rays, 5
-seeds), filtered light levels differ by -2.6 to -3.9 % without this correction and by -0.3 to -2.1 % with it.
-In a house of two storeys they differ by -1.2 and 0.0 %. RMS errors do not change.
+*Measured* differences between the mean of the filtered values and the mean of the samples: in a cellar behind
+one small window (64 and 256 rays, 5 seeds), -2.6 to -3.9 % without this correction, and -0.3 to -2.1 % with
+it. In a house of two storeys, -1.2 % without the correction, and 0.0 % with it. RMS errors do not change.
 """
 
 from __future__ import annotations

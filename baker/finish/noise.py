@@ -1,7 +1,7 @@
 """Estimates a page's noise from its values, for callers without standard errors.
 
-The page is filtered with a high-pass filter that is 0 on planes. The median of the result over a block
-ignores the few texels on a shadow's edge and measures the noise of the others.
+The page is filtered with a high-pass filter whose result is 0 on planes. The noise of a block is computed
+from the median of the absolute results, on which the few texels at a shadow edge have little influence.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from baker.finish.tiles import over_rows
 
 # Side of a block, texels.
 BLOCK = 16
-# Number of filtered texels below which the median of a block is replaced by that of the chart, and the median
-# of a chart by that of the page.
+# Number of filtered texels. Below it, the median of a block is replaced by the median of the chart, and the
+# median of a chart by the median of the page.
 FEWEST = 12
 # Median of |x| of a standard normal variable.
 NORMAL_MEDIAN = 0.6744898
@@ -70,8 +70,9 @@ def _grouped_median(
     known: NDArray[np.bool_],
     otherwise: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    # Return (n,) float64: for each texel, the upper median of `size` over the texels of its group with
-    # `known` set, or its entry of `otherwise` if fewer than FEWEST of them are set. All arguments are (n,).
+    # Return (n,) float64: for each texel, the upper median of `size` over the texels of its group where
+    # `known` is set. If `known` is set at fewer than FEWEST texels of the group, return the texel's item of
+    # `otherwise`. All arguments are (n,).
     _, index = np.unique(group, return_inverse=True)
     count = np.bincount(index[known], minlength=int(index.max()) + 1)
     order = np.lexsort((size[known], index[known]))

@@ -1,9 +1,9 @@
 """Runs Open Image Denoise's filters; the only file that imports `pyoidn`.
 
-*Measured* with OIDN 2.5.1 on the CPU: the result has the same bytes for 1 and 2 threads, from run to run, and
-for any `memory_mb` (tiles overlap by the network's receptive field). The lightmap filter ignores the options
-`hdr` and `quality`, because it has a single network. Loading the library takes 0.2 s, creating the device and
-the network 0.04 s.
+*Measured* with OIDN 2.5.1 on the CPU: the result has the same bytes in each run, with 1 and 2 threads, and
+for any `memory_mb`, because tiles overlap by the network's receptive field. The lightmap filter ignores the
+options `hdr` and `quality`, because it has a single network. Loading the library takes 0.2 s. Creating the
+device and the network takes 0.04 s.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def filter_picture(
     threads: int = 0,
     progress: Progress = silent,
 ) -> NDArray[np.float32]:
-    """Denoise a rendered HDR picture, guided by albedo and normals at the first hits of its pixels.
+    """Denoise a rendered HDR picture, with albedo and normals at first hits as auxiliary images.
 
     Parameters
     ----------
@@ -102,8 +102,8 @@ def filter_picture(
 class LightmapDenoiser:
     """Denoises pages one after the other and keeps the filter's scratch memory until `close`.
 
-    *Measured* on pages of 512 x 512 texels: with a new device for each page, denoising takes a seventh
-    longer, because the operating system clears the scratch memory (160 MB) each time.
+    *Measured* on pages of 512 x 512 texels: if a new device is created for each page, denoising takes a
+    seventh longer, because the operating system clears the scratch memory (160 MB) each time.
 
     Parameters
     ----------
@@ -139,8 +139,8 @@ class LightmapDenoiser:
         Parameters
         ----------
         image : (H, W, 3) float32
-            Linear light, finite and not negative. If `signed`, finite values of both signs. All pixels must
-            have a meaningful value.
+            Linear light, finite and not negative. If `signed` is true, finite values of both signs. All
+            pixels must have a meaningful value.
         progress : Progress
             Called with the fraction done; a truthy return value stops the filter.
         signed : bool
@@ -226,7 +226,8 @@ class _Monitor:
         )
 
     def _step(self, user: int | None, fraction: float) -> bool:
-        # Store any exception, KeyboardInterrupt included, and stop the filter: it cannot pass through C code.
+        # Store any exception, KeyboardInterrupt included, and stop the filter, because exceptions cannot pass
+        # through C code.
         try:
             if self._caught is None:
                 report(self._progress, Stage.DENOISE, float(fraction))

@@ -1,4 +1,4 @@
-"""Packs some charts of a page on a smaller page, so that a filter processes few other texels."""
+"""Packs chosen charts of a page on a smaller page, so that a filter processes few other texels."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from baker.finish.kernels.page_charts import chart_boxes
 
-# Empty texels between packed charts. The denoiser fills them by reflection.
+# Number of empty texels between packed charts. The denoiser fills them by reflection.
 _GAP = 8
 
 

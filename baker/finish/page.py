@@ -16,7 +16,7 @@ def check_page(value: NDArray[np.float32], chart: NDArray[np.int32], **masks: ND
     Parameters
     ----------
     value : (H, W, C) float32
-    chart : (H, W) int32, -1 = empty
+    chart : (H, W) int32, -1 for empty texels
     masks : (H, W) or (H, W, n) arrays by name
 
     Raises

@@ -5,10 +5,11 @@ centroid. A bilinear lookup interprets the mean as the value at the texel centre
 corrections are made:
 
 1. A plane fitted to neighbouring texels extrapolates the value to the texel centre.
-2. The value is changed so that a bilinear lookup at the centroid, between the texel and its extrapolated
-   neighbours, returns the mean. This helps where light falls off faster than a plane, as at a narrow gap.
+2. The value is changed so that a bilinear lookup at the centroid, which interpolates between the texel and
+its extrapolated neighbours, returns the mean. This reduces the error if light falls off faster than linearly,
+as at a narrow gap.
 
-*Measured* RMS error within half a texel of the border:
+*Measured* RMS error of lookups within half a texel of the border:
 
     case                                    | no correction | plane  | plane and lookup matching
     contact shadow of 6 texels              | 5.0 %         | 0.9 %  | 0.9 %
@@ -27,8 +28,8 @@ from baker.finish.kernels.page_slope import match_lookups, move_to_centre
 from baker.finish.page import check_page, highest_of_charts
 from baker.finish.tiles import over_rows
 
-# Smallest centroid offset that is corrected, texels. Centroids are computed from 16 points per texel and have
-# about this error.
+# Smallest centroid offset that is corrected, texels. Centroids of texels that another surface divides
+# (`radiosity.sides`) are means of up to 16 points.
 SMALLEST_OFFSET = 0.02
 
 
@@ -42,15 +43,16 @@ def recentre(
 ) -> NDArray[np.float32]:
     """Correct each covered texel so that a bilinear lookup at its centroid returns its mean value.
 
-    Only texels of the same chart are read. The result is limited to the range of the values in the 5 x 5
-    texels around it. If values rise or fall monotonically, this range is extended by up to half its size.
+    Only texels of the same chart are read. The result is limited to the range of the values in the window of
+    5 x 5 texels around the texel. If values rise or fall monotonically, this range is extended by up to half
+    its size.
 
     Parameters
     ----------
     value : (H, W, C) float32
         Means over the covered part of each texel.
     chart : (H, W) int32
-        Index of the chart of each texel, -1 = empty.
+        Index of the chart of each texel, -1 for empty texels.
     centroid_offset : (H, W, 2) float32
         Centroid of the covered part minus texel centre: (column, row), texels.
     valid : (H, W) bool, optional

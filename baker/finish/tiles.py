@@ -5,22 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-# Rows of the page in a band: enough to make the overhead of a call negligible, few enough to balance threads.
+# Number of rows of the page in a band. With fewer rows, the overhead of the calls would matter. With more
+# rows, some threads would wait for the last bands.
 ROWS = 64
 
 
 def over_rows(kernel: Callable[[int, int], object], height: int, threads: int, band_rows: int = ROWS) -> None:
-    """Call `kernel(first_row, end_row)` for all bands of a page of `height` rows.
+    """Call `kernel(first_row, end_row)` for each band of a page of `height` rows.
 
     Parameters
     ----------
     kernel : callable
-        Must write only the rows first_row to end_row - 1, so that the number of threads does not change the
-        result.
+        The function to call. It must write only the rows first_row to end_row - 1, so that the result does
+        not depend on the number of threads.
     height : int
         Number of rows of the page.
     threads : int
-        Number of threads; 1 runs the bands in the calling thread.
+        Number of threads; with 1, the bands run in the calling thread.
     band_rows : int
         Number of rows in a band.
     """

@@ -30,8 +30,8 @@ _FLAT = 0.1
 # Area of the missing lid divided by the area of the part. Above it, the part is a sheet, not a part without a
 # lid.
 _WIDEST_LID = 0.9
-# Distance of two vertices of different objects along each axis, divided by the largest coordinate of all open
-# boundaries' parts. Up to it, the vertices coincide.
+# Distance of two vertices of different objects along each axis, divided by the largest coordinate of all
+# vertices. Up to it, the vertices coincide.
 _TOGETHER = 4e-7
 
 

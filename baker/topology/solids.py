@@ -183,7 +183,7 @@ class _Classifier:
         self.start = np.searchsorted(parts.part[self.order], np.arange(n + 1))
         weight = self._areas(in_part)
         area = np.maximum(parts.area, 1e-300)
-        # Compare with half of `ClosedParts.area`, which is the area of the faces that form the part.
+        # Compare with half of `ClosedParts.area`, in which slivers may be missing.
         self.inward = np.bincount(of, weight * (parts.outward[in_part] < 0), minlength=n) > 0.5 * area
         self.two_sided = np.bincount(of, weight * surfaces.double_sided[in_part], minlength=n) > 0.5 * area
         self.emits = np.bincount(of, surfaces.emits[in_part], minlength=n) > 0

@@ -9,7 +9,7 @@ from baker.topology.unique_rows import unique_rows
 
 
 def weld(*key: NDArray[np.floating]) -> NDArray[np.int32]:
-    """Number the values of rows: equal rows get the same number, in the order of first occurrence.
+    """Number rows by value: equal rows get the same number, in the order of first occurrence.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def weld(*key: NDArray[np.floating]) -> NDArray[np.int32]:
 
 
 def number_rows(row: NDArray[np.float32]) -> NDArray[np.int64]:
-    """Number the values of rows: equal rows get the same number, in the order of a hash.
+    """Number rows by value: equal rows get the same number, in the order of a hash of the rows.
 
     -0 equals 0, and NaN equals NaN with the same bits.
 
@@ -42,8 +42,8 @@ def number_rows(row: NDArray[np.float32]) -> NDArray[np.int64]:
 
     Notes
     -----
-    `unique_rows` is as fast, but numbers rows by first occurrence. `closed_parts` adds areas in the order of
-    the numbers, so with `unique_rows` the last digits of bakes would change.
+    `unique_rows` is as fast, but numbers rows by first occurrence. `topology.closed_parts` adds areas in the
+    order of the numbers. So with `unique_rows`, the last digits of bakes would change.
     """
     if not len(row):
         return np.zeros(0, np.int64)

@@ -11,10 +11,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-# Number of faces of a surface above which `Enclosure` does not sum solid angles, which would take too long.
+# Number of faces of a surface. Above it, `Enclosure` does not sum solid angles, because this would take too
+# long.
 MANY = 4096
-# An approximate rotation. `Enclosure` casts lines along its last axis, which is parallel to no direction that
-# is usual in models, so that lines miss edges and vertices.
+# An approximate rotation matrix. `Enclosure` casts lines along its third row, which is parallel to no
+# direction that is usual in models, so that lines rarely hit edges and vertices.
 _TURN = np.array(
     [
         [0.6363961031, 0.7071067812, 0.3082207001],
@@ -54,9 +55,9 @@ def winding_number(corner: NDArray[np.float64], point: NDArray[np.float64]) -> f
 class Enclosure:
     """A closed surface, prepared for winding numbers about many points.
 
-    If it has more than `MANY` faces, the winding number is computed from the faces that a line from the point
-    crosses. This takes less time than solid angles, but is not reliable on the surface itself or near large
-    holes.
+    If the surface has more than `MANY` faces, the winding number is computed from the faces that a half line
+    from the point crosses. This takes less time than summing solid angles, but is not reliable for points on
+    the surface or near large holes.
 
     Parameters
     ----------

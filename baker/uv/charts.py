@@ -21,7 +21,7 @@ from baker.uv.xatlas_charts import ChartJob, FlatCharts
 class MeshCharts:
     """Charts of a mesh.
 
-    A lightmap vertex is a mesh vertex with a uv. A mesh vertex on a seam has several of them.
+    A lightmap vertex is a mesh vertex with a uv. A mesh vertex on a seam becomes several lightmap vertices.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class MeshCharts:
     vertex_chart : (V',) int32
         Chart of each lightmap vertex.
     n_repaired : int
-        Number of triangles, with area, that were laid out by `planar_charts`.
+        Number of triangles of nonzero area that `planar_charts` laid out.
     """
 
     vertex: NDArray[np.int32]
@@ -54,7 +54,7 @@ class MeshCharts:
 
 @dataclass(frozen=True)
 class _Welded:
-    """A mesh of which vertices with equal position are one vertex.
+    """A mesh after its vertices with equal positions were merged.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ def chart_meshes(
     progress : Progress
         Called with fractions of the stage from 0 to `until`.
     until : float
-        Fraction of the stage at which all meshes are cut.
+        Fraction of the stage to report when all meshes are cut.
 
     Returns
     -------
@@ -102,7 +102,7 @@ def chart_meshes(
     chart = [np.full(len(w.triangle), -1, np.int64) for w in welded]
     base = 0
     for answer, pieces in zip(answers, origin, strict=True):
-        # Offset the chart numbers, which start at 0 in each job.
+        # Offset the chart numbers of each job, which start at 0.
         number = np.where(answer.chart >= 0, answer.chart.astype(np.int64) + base, -1)
         base = int(number.max(initial=base - 1)) + 1
         row = 0
@@ -127,10 +127,10 @@ def _weld_mesh(position: NDArray[np.float64], triangle: NDArray[np.int32]) -> _W
 
 
 def _make_jobs(welded: Sequence[_Welded]) -> tuple[list[ChartJob], list[list[tuple[int, NDArray[np.int64]]]]]:
-    """Bundle parts into jobs of at most `JOB_TRIANGLES` triangles, unless a single part has more.
+    """Bundle parts into jobs of at most `JOB_TRIANGLES` triangles. A larger part is a separate job.
 
-    Also return, for each job, its parts as pairs of mesh index and face indices. The jobs do not depend on
-    the number of threads.
+    Also return the parts of each job, as pairs of mesh index and face indices. The jobs do not depend on the
+    number of threads.
     """
     jobs: list[ChartJob] = []
     origin: list[list[tuple[int, NDArray[np.int64]]]] = []

@@ -7,16 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-# Distance, in uv, by which a valid lightmap uv may leave the range 0 to 1, because exporters round.
+# Distance, in uv, by which a valid lightmap uv may exceed the range 0 to 1. It allows for rounding in
+# exporters.
 RANGE_SLACK = 1e-4
-# Share of a mesh's surface that may have no area in a valid lightmap uv.
+# Largest share of a mesh's surface without area in uv. Above it, the lightmap uv is not valid.
 MOST_LOST = 0.01
-# Share of samples that may be covered twice, of an object in a page and of a chart. It is not 0, because
-# rounded borders may cross.
+# Share of samples that may be covered twice: of an object in a page (PAGE_TOLERANCE), and of a chart
+# (CHART_TOLERANCE). They are not 0, because rounding may make borders cross.
 PAGE_TOLERANCE = 1e-3
 CHART_TOLERANCE = 0.01
-# Distance of a sample from an edge, in units of the sample spacing, below which the sample is inside neither
-# triangle of that edge.
+# Distance of a sample from an edge, in units of the sample spacing. Up to it, the sample is inside neither of
+# the triangles at the edge.
 EDGE_SLACK = 0.05
 
 
@@ -38,7 +39,7 @@ class Overlap:
     def overlaps(self, tolerance: float) -> NDArray[np.bool_]:
         """Return (G,) bool: whether more than the share `tolerance` of a group's samples is covered twice.
 
-        At most two such samples are ignored.
+        Up to two samples that are covered twice are ignored.
         """
         return (self.doubled > tolerance * self.covered) & (self.doubled > 2)
 
@@ -46,15 +47,16 @@ class Overlap:
 def page_overlap(uv: NDArray[np.floating], group: NDArray[np.integer], resolution: int) -> Overlap:
     """Count the samples of one page that triangles cover more than once.
 
-    There are 2 x 2 samples per texel, or one if the page is more than 4096 texels wide.
+    There are 2 x 2 samples per texel. If the page is more than 4096 texels wide, there is one sample per
+    texel.
 
     Parameters
     ----------
     uv : (T, 3, 2) float
         Page uv of the triangles' corners.
     group : (T,) int
-        Group of each triangle, ascending. If triangles of two groups overlap, the later group has the
-        overlap.
+        Group of each triangle, ascending. If triangles of two groups overlap, the overlap is counted for the
+        later group.
     resolution : int
         Page width, texels.
 

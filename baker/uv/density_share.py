@@ -1,8 +1,8 @@
-"""Lower texel density for objects on which a lightmap is invisible.
+"""Computes a lower texel density for objects on which a lightmap is invisible.
 
 An emitter with a black base colour, such as a sky dome, reflects nothing. A surface of alpha 0 is invisible.
-At equal density, a sky dome would fill almost the whole page, because its area is much larger than that of
-the scene inside.
+With the same density as other objects, a sky dome would fill almost the whole page, because its area is much
+larger than the area of the scene inside.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from baker.core.scene import Instance, Material, Scene
 
-# Largest share of the page's used area that all such objects get together.
+# Largest share of the page's used area for all objects on which a lightmap is invisible.
 _MOST = 0.05
 
 
 def density_shares(scene: Scene, instances: list[Instance]) -> NDArray[np.float64]:
-    """Return (N,) float64: the factor by which the density of each instance is multiplied on a filled page.
+    """Return (N,) float64: the factor on the texel density of each instance.
 
     It is below 1 only for instances on which a lightmap is invisible.
     """
@@ -33,7 +33,7 @@ def density_shares(scene: Scene, instances: list[Instance]) -> NDArray[np.float6
 
 
 def _shows_nothing(material: Material) -> bool:
-    """Return whether a lightmap is invisible on a material: a black one that emits, or one of alpha 0."""
+    """Return whether a lightmap is invisible on a material: it is black and emits, or its alpha is 0."""
     black = max(material.base_colour[:3]) <= 0.0 and max(material.emission) > 0.0
     return black or (material.alpha_mode != "OPAQUE" and material.base_colour[3] <= 0.0)
 

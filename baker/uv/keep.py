@@ -1,4 +1,4 @@
-"""Tests whether the TEXCOORD_1 of meshes are valid lightmap uv, and finds their charts."""
+"""Tests whether TEXCOORD_1 of a mesh is a valid lightmap uv, and finds the charts of kept uv."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ class KeptUv:
     Attributes
     ----------
     usable : (I,) bool
-        Whether the TEXCOORD_1 of the instance is a valid lightmap uv. Overlap with other instances is not
-        tested.
+        Whether TEXCOORD_1 of the instance is a valid lightmap uv. Overlap with other instances is not tested.
     together : bool
-        Whether the TEXCOORD_1 of all instances fit one page without overlap. They are then kept unchanged.
+        Whether all instances fit one page with their TEXCOORD_1, without overlap. TEXCOORD_1 is then kept
+        unchanged.
     warnings : tuple of SceneWarning
-        Warnings about TEXCOORD_1 that are not valid.
+        Warnings about instances whose TEXCOORD_1 is not valid.
     """
 
     usable: NDArray[np.bool_]
@@ -47,7 +47,7 @@ def find_fault(mesh: Mesh, resolution: int) -> tuple[str, str] | None:
     mesh : Mesh
         The mesh, which need not have TEXCOORD_1.
     resolution : int
-        Page width in texels, at which overlap and area are measured.
+        Width of the page in texels, which determines the samples of the overlap test and the unit of area.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def find_fault(mesh: Mesh, resolution: int) -> tuple[str, str] | None:
 
 
 def choose_kept(scene: Scene, resolution: int, mode: str) -> KeptUv:
-    """Find the instances whose TEXCOORD_1 is kept.
+    """Find the instances whose TEXCOORD_1 can be kept.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def close_charts(
     resolution : int
         Page width in texels.
     gap : int
-        Largest distance of the other chart's texel, in rows and in columns.
+        Largest distance between the two texels, in rows and in columns.
 
     Returns
     -------

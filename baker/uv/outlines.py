@@ -1,4 +1,4 @@
-"""Makes the outlines that are packed, and computes the uv of instances from packed outlines."""
+"""Makes the outlines to pack, and computes the uv of instances from packed outlines."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from baker.uv.pack import Packing, Shapes
 
 @dataclass(frozen=True)
 class CutInstance:
-    """An instance whose mesh was cut into charts, which are packed one by one.
+    """An instance whose mesh was cut into charts, which are packed separately.
 
     Attributes
     ----------
@@ -31,14 +31,14 @@ class CutInstance:
 
 @dataclass(frozen=True)
 class RigidInstance:
-    """An instance that keeps its uv, which are moved and scaled as a whole.
+    """An instance that keeps its uv layout, which is only moved and scaled as a whole.
 
     Attributes
     ----------
     uv : (V, 2) float64
         Uv of each vertex.
     low, high : (2,) float64
-        Lower and upper bounds of the uv of vertices that triangles use.
+        Lower and upper bounds of the uv of all vertices that triangles use.
     factor : float
         Metres per unit of uv, multiplied by the instance's factor on density (`density_shares`).
     """
@@ -60,11 +60,11 @@ class Outlines:
     shapes : Shapes
         The S different outlines.
     turned : (S,) bool
-        Whether u and v are exchanged in the shape, so that its width is not less than its height.
+        Whether u and v are exchanged in the shape, which makes its width at least its height.
     item_shape : (I,) int64
         Shape of each item.
     first_item : (N + 1,) int64
-        Items of instance i: `first_item[i]` to `first_item[i + 1]` - 1.
+        Instance i has the items `first_item[i]` to `first_item[i + 1]` - 1.
     """
 
     shapes: Shapes

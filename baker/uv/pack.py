@@ -1,7 +1,7 @@
 """Packs outlines into one square page, and finds the largest density at which they fit.
 
 In this file, texel centres have integer coordinates. The lower corner of an outline is at a texel centre, so
-that lookups at straight borders read texels without interpolation.
+that lookups at straight borders of charts need no interpolation between texels.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from baker.core.progress import Progress, report
 from baker.core.stage import Stage
 
-# Number of items times number of texels of the page, after which `progress` is called again.
+# Number of items to place times number of texels of the page, after which `progress` is called again.
 _CHUNK_WORK = 1 << 29
 
 
@@ -27,14 +27,14 @@ class Shapes:
     corner : (T, 3, 2) float64, metres
         Corners of the triangles of all shapes. The lower corner of each shape's bounding box is at 0.
     first_triangle : (S + 1,) int64
-        Triangles of shape s: `first_triangle[s]` to `first_triangle[s + 1]` - 1.
+        Shape s has the triangles `first_triangle[s]` to `first_triangle[s + 1]` - 1.
     extent : (S, 2) float64, metres
         Width and height of each shape's bounding box.
     area : (S,) float64, square metres
         Area of each shape's triangles.
     rigid : (S,) bool
-        Whether the shape is scaled uniformly. Other shapes are stretched so that width and height are whole
-        numbers of texels.
+        Whether the shape is scaled uniformly. Other shapes are stretched so that their width and height are
+        whole numbers of texels.
     """
 
     corner: NDArray[np.float64]
@@ -67,7 +67,7 @@ class Packing:
     height : int
         Number of rows in use, including the page border.
     placed : int
-        Number of items that were placed. The packing is complete if all of them were.
+        Number of items that were placed; I if the packing is complete.
     placed_area : float
         Area of the placed items divided by the area of all items, gaps included.
     """
@@ -82,7 +82,7 @@ class Packing:
 def border(gap: int) -> int:
     """Return the width of a page's empty border, texels.
 
-    It is half a gap, so that there is a whole gap between a page and its repetition.
+    It is half the gap between outlines, so that there is a whole gap if the page is repeated.
     """
     return max(1, (gap + 1) // 2)
 
@@ -90,7 +90,7 @@ def border(gap: int) -> int:
 def texel_gap(padding: int) -> int:
     """Return the number of empty texels between outlines: `padding`, but at least 2.
 
-    Bilinear lookup reads one texel beyond each outline.
+    2 is the minimum, because bilinear lookup reads one texel beyond each outline.
     """
     return max(2, padding)
 
@@ -164,11 +164,10 @@ def pack(
 def _spans(
     shapes: Shapes, scale: NDArray[np.float64], n_rows: NDArray[np.int64], used: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.int32]]:
-    """Return the span of texels, first to last column, in each row of the shapes `used`.
+    """Return the first and the last column of each row of the shapes `used`.
 
     scale : (S, 2), texels per metre; n_rows : (S,), number of rows of each shape; used : indices of shapes
-    Returns (S + 1,) index of each shape's first row in the next two arrays; (R,) first column; (R,) last
-    column.
+    Returns `first_row` (S + 1,), `low` (R,) and `high` (R,), see `outline_spans`.
     """
     from baker.uv.kernels.uv_pack import outline_spans
 
@@ -202,7 +201,7 @@ def fit_page(
     progress : Progress
         Called with fractions of the stage.
     span : (float, float)
-        First and last fraction of the stage.
+        First and last fraction of the stage to report.
     most : float
         Upper limit of the density, texels per metre.
 
@@ -225,7 +224,7 @@ def fit_page(
         result = pack(shapes, item_shape, np.full(n, guess), page, progress, fraction)
         if result.placed == len(item_shape):
             low, best = guess, result
-            # Extrapolate from the unused height, because the area grows with the square of the density.
+            # Estimate the next density from the unused height: the area grows with the square of the density.
             step = guess * float(np.sqrt(resolution / max(1, result.height))) * 1.003
         else:
             high = guess
@@ -233,8 +232,8 @@ def fit_page(
         if best is not None and (low >= ceiling or high <= low * (1 + tolerance)):
             break
         if best is None and k >= n_tries - 3:
-            # Outlines are at least one texel in size, so their area shrinks slowly. Reduce the density in
-            # large steps.
+            # Reduce the density in large steps. Outlines are at least one texel in size, so their area
+            # shrinks slowly.
             step = guess / 30.0
         margin = 0.25 * (high - low)
         guess = min(max(step, low + margin), high - margin) if best is not None and high < ceiling else step

@@ -1,4 +1,4 @@
-"""Distributes instances over pages: on one page at the largest density, or on several at a given density."""
+"""Distributes instances over pages: one page at the largest density, or several at a given density."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from baker.core.settings import BakeSettings
 from baker.uv.outlines import Outlines
 from baker.uv.pack import Packing, border, fit_page, pack, texel_gap
 
-# Estimated share of a page's area that the instances of the first attempt to fill it need, and largest number
-# of attempts for a page.
+# _FIRST_FILL: share of a page's area that is filled in the first attempt, by the estimate `_Packer.need`.
+# _PAGE_TRIES: largest number of attempts to fill a page.
 _FIRST_FILL = 0.92
 _PAGE_TRIES = 8
 
 
 @dataclass(frozen=True)
 class Page:
-    """A page: its N instances, and the positions of their items, see `Outlines`.
+    """A page: its N instances, and the positions of their items (see `Outlines`).
 
     Attributes
     ----------
@@ -89,9 +89,9 @@ def fill_pages(
 ) -> tuple[list[Page], list[SceneWarning]]:
     """Pack all instances into pages of exactly `settings.resolution` texels.
 
-    Without `settings.density`, all instances are packed into one page, at the largest density that fits. With
-    it, they are packed at that density into up to `max_pages` pages. If these are not enough, the density is
-    lowered.
+    If `settings.density` is None, all instances are packed into one page, at the largest density that fits.
+    Otherwise they are packed at this density into up to `max_pages` pages. If the pages are not enough, the
+    density is lowered.
 
     Parameters
     ----------
@@ -142,8 +142,8 @@ def fill_pages(
                 )
                 warnings.append(SceneWarning("uv.padding_reduced", message))
             return pages, warnings
-    # The charts do not fit one page at any density. Distribute them over several pages, at first at the
-    # density at which their area is a quarter of all pages.
+    # The charts do not fit one page at any density, so distribute them over several pages. Start with the
+    # density at which the area of the charts is a quarter of the area of all pages.
     packer = _Packer(outlines, settings.resolution, gaps[-1], progress)
     area = float(outlines.shapes.area[outlines.item_shape].sum())
     start = settings.resolution * float(np.sqrt(0.25 * settings.max_pages / max(area, 1e-12)))
@@ -158,8 +158,8 @@ def _fill_at(
 ) -> list[Page]:
     """Pack all instances at the density `wanted`, texels per metre, into up to `max_pages` pages.
 
-    Instances that exceed an empty page get a lower density. If the pages are not enough, all instances do.
-    Warnings are appended to `warnings`.
+    An instance that does not fit an empty page gets a lower density. If the pages are not enough, all
+    instances get a lower density. Warnings are appended to `warnings`.
     """
     n = len(packer.outlines.first_item) - 1
     everything = np.arange(n)
@@ -188,7 +188,7 @@ def _fill_at(
 
 
 def _alone(packer: _Packer, target: float, names: list[str]) -> tuple[NDArray[np.float64], list[int]]:
-    """Return the density (I,), at most `target`, at which each instance fits an empty page.
+    """Return the density (I,), up to `target`, at which each instance fits an empty page.
 
     Also return the indices of the instances whose density is below `target`.
     """
@@ -216,7 +216,7 @@ def _alone(packer: _Packer, target: float, names: list[str]) -> tuple[NDArray[np
 
 
 def _distribute(packer: _Packer, density: NDArray[np.float64], max_pages: int) -> list[Page] | None:
-    """Fill one page after the other, with the largest instances first; return None if the pages run out.
+    """Fill one page after the other, largest instances first; return None if the pages are not enough.
 
     density : (I,) float64, texels per metre
     """
@@ -258,9 +258,10 @@ def _distribute(packer: _Packer, density: NDArray[np.float64], max_pages: int) -
 
 
 def _take(need: NDArray[np.float64], fill: float) -> NDArray[np.bool_]:
-    """Return (N,) bool: the instances to put on a page up to the share `fill` of its area.
+    """Return (N,) bool: the instances to put on a page, up to the share `fill` of its area.
 
-    The first instance is always taken. Each other one is taken, in order, if it does not exceed `fill`.
+    The first instance is always taken. Each of the other instances is taken, in order, if the sum of the
+    needs then does not exceed `fill`.
 
     need : (N,) float64, share of a page's area that each instance needs
     """

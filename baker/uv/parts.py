@@ -7,24 +7,24 @@ from numpy.typing import NDArray
 
 from baker.topology.weld import connected_faces, connected_vertices
 
-# Largest number of triangles of a block, which is halved above it, and of a job that bundles several parts.
+# Largest number of triangles of a block, and of a job that bundles several parts. Larger blocks are halved.
 JOB_TRIANGLES = 20_000
-# Number of triangles of a connected part above which it is cut into blocks. The time of xatlas grows faster
-# than linearly with the size of a part, and it crashed on a part of 328,000 triangles.
+# Number of triangles of a connected part. Above it, the part is cut into blocks. The time of xatlas grows
+# faster than linearly with the size of a part, and xatlas crashed on a part of 328,000 triangles.
 SPLIT_TRIANGLES = 40_000
 # xatlas treats neighbours as one plane if their normals differ by less than about 2.5 degrees. It joins them
 # transitively, so that a finely tessellated sphere becomes one "planar" chart. SMOOTH_DOT is about the cosine
-# of that angle. A region of triangles joined in this way is cut if it has more than SMOOTH_TRIANGLES
-# triangles and is not flat, see MIN_FACING.
+# of that angle. Triangles joined by this rule form a region. A region of more than SMOOTH_TRIANGLES triangles
+# is cut if it is not flat, see MIN_FACING.
 SMOOTH_DOT = 0.9985
 SMOOTH_TRIANGLES = 500
-# Smallest cosine between the normals of a region and their mean, about 40 degrees. A region with a smaller
-# cosine is cut until each block reaches it.
+# Smallest cosine, of about 40 degrees, between the normals of a flat region and their mean. A region with a
+# smaller cosine is cut until no block has a smaller cosine.
 MIN_FACING = 0.77
 
 
 def cut_parts(position: NDArray[np.float64], triangle: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Cut a mesh into connected parts.
+    """Divide a mesh into connected parts, and cut large or curved parts.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def cut_parts(position: NDArray[np.float64], triangle: NDArray[np.int32]) -> NDA
         n = _cut_blocks(block, n, np.flatnonzero((part == k) & ~curled[region]), centre, None, None)
     if n == 1:
         return part
-    # Split blocks into parts connected by edges. Triangles that touch in a vertex only get separate parts.
+    # Split blocks into parts connected by edges. Triangles that share only a vertex get separate parts.
     return connected_faces(triangle, part.astype(np.int64) * n + block)
 
 
@@ -83,9 +83,10 @@ def _cut_blocks(
     normal: NDArray[np.float64] | None,
     cross: NDArray[np.float64] | None,
 ) -> int:
-    """Halve the faces until each block has at most `JOB_TRIANGLES` and, with `normal`, similar normals.
+    """Halve a set of faces until each block has at most `JOB_TRIANGLES` faces.
 
-    Write the blocks' numbers, from `n` on, to `block`, and return the next free number.
+    If `normal` is given, also halve blocks until their normals are similar (`MIN_FACING`). The blocks'
+    numbers, from `n` on, are written to `block`. Returns the next free number.
 
     block : (T,) int64, in and out; face : (N,) int64, indices of the faces to cut
     centre, normal, cross : (T, 3) float64, centroids, unit normals, and normals whose length is twice the

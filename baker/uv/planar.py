@@ -1,7 +1,8 @@
 """Planar charts for triangles that xatlas left out, or whose chart overlapped itself.
 
 Connected faces whose normals have the same largest component, with the same sign, are projected to a plane.
-Triangles that the projection distorts or makes overlap become single charts.
+If the projection distorts a triangle strongly, the triangle becomes a separate chart. If a projected chart
+overlaps itself, each of its triangles becomes a separate chart.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ def planar_charts(
     """
     corner = position[triangle]
     cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    # Join faces that share an edge and whose normals are closest to the same one of the six axis directions.
+    # Join faces that share an edge if their normals are closest to the same axis direction, of six.
     axis = np.abs(cross).argmax(axis=1)
     side = 2 * axis + (np.take_along_axis(cross, axis[:, None], axis=1)[:, 0] < 0)
     chart = connected_faces(triangle, side)
@@ -49,8 +50,8 @@ def planar_charts(
         [np.einsum("tkx,tx->tk", corner, tangent[chart]), np.einsum("tkx,tx->tk", corner, bitangent[chart])],
         axis=2,
     )
-    # Make each face a single chart if its normal deviates more than 75 degrees from the normal of its chart,
-    # or if its chart overlaps itself.
+    # Make a face a separate chart if its normal deviates by more than 75 degrees from the normal of its
+    # chart, or if its chart overlaps itself.
     area = np.linalg.norm(cross, axis=1)
     facing = np.einsum("tx,tx->t", cross, normal[chart])
     alone = (
@@ -63,7 +64,7 @@ def planar_charts(
 
 
 def lay_flat(corner: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Lay triangles (T, 3, 3) in the plane, congruent and with the longest edge along u; return (T, 3, 2)."""
+    """Map triangles (T, 3, 3) to congruent uv triangles (T, 3, 2) with the longest edge along u."""
     edge = np.roll(corner, -1, axis=1) - corner
     length = np.linalg.norm(edge, axis=2)
     first = length.argmax(axis=1)

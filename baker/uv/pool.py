@@ -18,12 +18,12 @@ from baker.core.stage import Stage
 from baker.uv.worker import receive_charts, send_job
 from baker.uv.xatlas_charts import ChartJob, FlatCharts, cut_charts
 
-# Number of triangles of all jobs below which they run in this process. Starting a worker process takes 0.2 s,
-# longer than cutting so few triangles.
+# Number of triangles of all jobs. Below it, the jobs run in this process, because starting a worker process
+# takes 0.2 s, which is longer than cutting the triangles.
 IN_PROCESS_TRIANGLES = 3000
-# Largest time between the end of a worker's pipe and the end of its process, seconds.
+# Largest time, seconds, between the end of a worker's pipe and the end of the worker process.
 _MOMENT = 1.0
-# How a process ends if native code crashes, as `Popen.returncode` has it.
+# Values of `Popen.returncode` of a process in which native code crashed.
 _CRASHES = {-getattr(signal, name, 0) for name in ("SIGSEGV", "SIGABRT", "SIGBUS", "SIGFPE", "SIGILL")}
 _LOST = (
     "a process that cuts charts has died twice, most likely for lack of memory; close other programs, or "
@@ -43,13 +43,13 @@ def run_jobs(jobs: Sequence[ChartJob], threads: int, progress: Progress, until: 
     progress : Progress
         Called with fractions of the stage from 0 to `until`.
     until : float
-        Fraction of the stage at which all jobs are done.
+        Fraction of the stage to report when all jobs are done.
 
     Returns
     -------
     list of FlatCharts
-        Charts of each job, in the order of `jobs`. If xatlas crashed twice on a job, all its triangles have
-        chart -1.
+        Charts of each job, in the order of `jobs`. If xatlas crashed twice on a job, all triangles of this
+        job have chart -1.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def run_jobs(jobs: Sequence[ChartJob], threads: int, progress: Progress, until: 
 
 
 class _Pool:
-    """Worker processes, each with a thread that sends it jobs. The largest jobs are started first."""
+    """Worker processes. A thread for each process sends it jobs. The largest jobs are started first."""
 
     def __init__(self, jobs: Sequence[ChartJob], n_workers: int, total: int) -> None:
         self.jobs = jobs

@@ -1,4 +1,4 @@
-"""The settings of lightmap uv: the settings of a bake that unwrapping reads."""
+"""The settings of lightmap uv, which are the bake settings that unwrapping reads."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from baker.uv.keep import choose_kept, close_charts, kept_charts, lightmap_uv
 from baker.uv.outlines import CutInstance, RigidInstance, make_outlines, place_uv
 from baker.uv.pages import fill_pages
 
-# Relative difference between the scales of an instance along different axes, up to which its scale is treated
+# Relative difference between the scales of an instance along different axes. Up to it, the scale is treated
 # as uniform.
 _EVEN_SCALE = 1e-4
 # Fraction of the stage "unwrap" at which cutting ends and packing starts.
@@ -31,9 +31,9 @@ _NONE = np.zeros(0, np.int32)
 
 @dataclass(frozen=True)
 class _Cut:
-    """A mesh to cut. Its positions are multiplied by the symmetric matrix `stretch` (3, 3) first.
+    """A mesh to cut, after its positions are multiplied by the symmetric matrix `stretch` (3, 3).
 
-    All instances with the same mesh and stretch share the charts.
+    All instances with the same mesh and stretch share their charts.
     """
 
     mesh: int
@@ -162,7 +162,7 @@ def _lay_out(
 def _placements(
     scene: Scene, filled: list[int], shares: NDArray[np.float64], usable: NDArray[np.bool_]
 ) -> tuple[list[CutInstance | RigidInstance], list[_Cut]]:
-    """Return the placement of each instance in `filled`, and the meshes to cut, each stretch of a mesh once.
+    """Return the placement of each instance in `filled`, and the distinct pairs of mesh and stretch to cut.
 
     filled : indices of n instances; shares : (n,), factors on their density; usable : (I,) bool, see `KeptUv`
     """
@@ -241,9 +241,10 @@ def _verify(
 def _world_stretch(world_from_object: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
     """Split the effect of a transform on lengths into a factor and a symmetric (3, 3) stretch.
 
-    For a uniform scale, the factor is the scale and the stretch is the identity, so that all such instances
-    of a mesh share their charts. Otherwise the factor is 1 and the stretch is the square root of M^T M, which
-    does not depend on rotations and mirrors. M is the linear part of the transform.
+    If the scale is uniform, the factor is the scale and the stretch is the identity, so that all uniformly
+    scaled instances of a mesh share their charts. Otherwise the factor is 1 and the stretch is the square
+    root of M^T M, where M is the linear part of the transform. This stretch does not depend on rotations and
+    mirrors in the transform.
     """
     linear = world_from_object[:3, :3].astype(np.float64)
     gram = linear.T @ linear
@@ -258,7 +259,7 @@ def _world_stretch(world_from_object: NDArray[np.float64]) -> tuple[float, NDArr
 
 
 def _rigid(mesh: Mesh, instance: Instance, share: float) -> RigidInstance:
-    """Return the placement of an instance that keeps its TEXCOORD_1 up to position and scale.
+    """Return the placement of an instance whose TEXCOORD_1 is kept, and only moved and scaled.
 
     share : factor on the density of the instance
     """
@@ -266,7 +267,7 @@ def _rigid(mesh: Mesh, instance: Instance, share: float) -> RigidInstance:
     assert uv is not None
     wide = uv.astype(np.float64)
     used = wide[mesh.triangle].reshape(-1, 2)
-    # Clamp the uv of unused vertices, which may have any value, to the bounds of the used ones.
+    # Clamp the uv of unused vertices, which may have any value, to the bounds of the uv of used vertices.
     wide = np.clip(np.nan_to_num(wide), used.min(axis=0), used.max(axis=0))
     factor = share / max(_per_metre(mesh, instance, uv), 1e-30)
     return RigidInstance(wide, used.min(axis=0), used.max(axis=0), factor)

@@ -1,7 +1,7 @@
 """The worker process that runs chart jobs. It can be killed while xatlas is busy.
 
-It receives messages on stdin and answers on stdout. A message is a length in 8 bytes, little-endian, followed
-by an npz file of that length.
+The process receives messages on stdin and answers on stdout. A message is a length in 8 bytes, little-endian,
+followed by an npz file of that length.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Cuts a mesh into flat charts with xatlas. Only this file imports xatlas.
 
 xatlas computes and packs charts in one call. Its packing stretches each chart to whole texels along u and v.
-This module discards the positions of that packing. It removes the stretch by fitting the scales along u and v
-to the edge lengths in space, by least squares.
+This module discards the positions of that packing. It also removes the stretch: for each chart, it fits
+scales along u and v to the edge lengths in space, by least squares.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from baker.topology.weld import connected_vertices, number_by_first
 
-# Limit of a chart's area, as a multiple of the mean triangle area of its part. Small charts save time:
-# cutting a mesh of 82,000 triangles took 54 s with 14 charts, 3.6 s with 46, and 1.2 s with 123.
+# Limit of a chart's area, as a multiple of the mean triangle area of its part. Small charts save time: with
+# limits that gave 14, 46 and 123 charts, cutting a mesh of 82,000 triangles took 54 s, 3.6 s and 1.2 s.
 CHART_FACES = 700
 
 
@@ -193,11 +193,11 @@ def _drop_flat(
     signed = 0.5 * (e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
     total = np.bincount(chart, weights=signed, minlength=n_charts)
     real = np.bincount(chart, weights=area, minlength=n_charts)
-    # Area, per chart, of faces whose signed area has the opposite sign of the chart's. They overlap a
-    # neighbour.
+    # For each chart, sum the area of faces whose signed area has the opposite sign of the chart's area. Such
+    # faces overlap a neighbour.
     back = np.where(signed * np.sign(total)[chart] < 0, np.abs(signed), 0.0)
     fold = np.bincount(chart, weights=back, minlength=n_charts)
-    # Area in space, per chart, of faces that have almost no area in the plane.
+    # For each chart, sum the area in space of faces that have almost no area in the plane.
     lost = np.bincount(chart, weights=np.where(np.abs(signed) < 1e-4 * area, area, 0.0), minlength=n_charts)
     bad = (np.abs(total) < 0.5 * real) | (fold > 1e-3 * real) | (lost > 1e-3 * real) | ~np.isfinite(total)
     return number_by_first(np.where(bad[chart], -1, chart))

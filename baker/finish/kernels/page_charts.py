@@ -45,8 +45,8 @@ def chart_boxes(chart, chosen, low, high):
     """Write the first and last row and column of each chart's chosen texels.
 
     chart : (H, W) int32; chosen : (H, W) bool
-    low, high : (n_charts, 2) int64 outputs, first and last (row, column). On entry `low` is at least the side
-        of the page and `high` is -1.
+    low, high : (n_charts, 2) int64 outputs, first and last (row, column); on entry, `low` is at least the
+        side of the page, and `high` is -1
     """
     height, width = chart.shape
     for r in range(height):

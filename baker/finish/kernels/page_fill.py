@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from baker.trace.jit import inner, kernel, larger, smaller
 
-# Distance from the border beyond which the fitted plane is constant, texels.
+# Distance from the border, texels. Beyond it, the fitted plane is continued as a constant.
 SLOPE_REACH = 6.0
-# Largest factor (and largest divisor) by which the plane changes a reflected value.
+# Largest factor by which the plane increases or decreases a reflected value.
 MOST = 4.0
 
 
@@ -27,8 +27,8 @@ def nearest_texel(mask: NDArray[np.bool_], out: NDArray[np.int32]) -> None:
     ----------
     mask : (H, W) bool
     out : (H, W) int32
-        Receives row * W + column of the nearest set texel, or -1 everywhere if none is set. The choice among
-        equally near texels depends on the mask only.
+        Receives row * W + column of the nearest set texel, or -1 everywhere if none is set. The choice
+        between equally near texels depends only on the mask.
     """
     row_of = np.full(mask.shape, -1, np.int32)
     apex, start = np.zeros((2, mask.shape[1]), np.int64)
@@ -37,7 +37,7 @@ def nearest_texel(mask: NDArray[np.bool_], out: NDArray[np.int32]) -> None:
 
 @kernel
 def _nearest(mask, row_of, apex, start, out):  # type: ignore[no-untyped-def]
-    """Write the flat index of the nearest set texel to each texel, see `nearest_texel`.
+    """For each texel, write the index row * W + column of the nearest set texel, see `nearest_texel`.
 
     mask : (H, W) bool; out : (H, W) int32 output
     row_of : (H, W) int32 full of -1, apex and start : (W,) int64, scratch
@@ -55,8 +55,10 @@ def _nearest(mask, row_of, apex, start, out):  # type: ignore[no-untyped-def]
             below = row_of[r + 1, c]
             if below >= 0 and (row_of[r, c] < 0 or below - r < r - row_of[r, c]):
                 row_of[r, c] = below
-    # In each row, compute the lower envelope of the columns' parabolas (squared distance as a function of the
-    # column) in exact integer arithmetic. apex[k] is the column of parabola k, start[k] its first column.
+    # In each row, compute the lower envelope of one parabola for each column, in exact integer arithmetic. A
+    # parabola is the squared distance to the nearest set texel of its column, as a function of the column.
+    # apex[k] is the column of parabola k of the envelope, start[k] the first column at which this parabola is
+    # the lowest.
     for r in range(height):
         n = 0
         for c in range(width):
@@ -67,7 +69,8 @@ def _nearest(mask, row_of, apex, start, out):  # type: ignore[no-untyped-def]
             while n > 0:
                 i = apex[n - 1]
                 gi = np.int64(row_of[r, i] - r)
-                # Compute the last column at which the texel of column i is at least as near as that of c.
+                # Compute the last column at which the set texel of column i is at least as near as the set
+                # texel of column c.
                 cut = (c * c - i * i + g * g - gi * gi) // (2 * (c - i))
                 if cut >= start[n - 1]:
                     first = cut + 1
@@ -93,10 +96,11 @@ def _nearest(mask, row_of, apex, start, out):  # type: ignore[no-untyped-def]
 def reflect_outwards(value, chart, covered, nearest, plane_row, plane, max_distance, first_row, end_row):  # type: ignore[no-untyped-def]
     """Fill the empty texels around charts by reflection at the charts' borders, in place.
 
-    Let q be the covered texel nearest to an empty texel p, and m the texel of q's chart opposite to p at the
-    same distance from q. Then value(p) = value(m) * plane(p) / plane(m), where the plane is fitted at q. So
-    the noise has the same statistics on both sides of the border, and gradients continue. If the chart is
-    thinner than the distance from p to q, m is found by repeated reflection at the chart's two borders.
+    Let q be the covered texel nearest to an empty texel p. Let m be the mirror texel: the texel of q's chart
+    on the other side of q, at the same distance from q as p. Then value(p) = value(m) * plane(p) / plane(m),
+    where the plane is fitted at q. So the noise has the same statistics on both sides of the border, and
+    gradients continue. If the chart is thinner than the distance from p to q, m is found by repeated
+    reflection at the chart's two borders.
 
     Parameters
     ----------
@@ -105,7 +109,7 @@ def reflect_outwards(value, chart, covered, nearest, plane_row, plane, max_dista
     covered : (H, W) bool
     nearest : (H, W) int32, from `nearest_texel` of `covered`
     plane_row : (H, W) int32
-        For each texel in `nearest`, the index of its plane in `plane`.
+        For each texel whose index occurs in `nearest`, the index of its plane in `plane`.
     plane : (n, 3, C) float32
         Planes fitted at n border texels: value, slope per column, slope per row.
     max_distance : int
@@ -143,7 +147,7 @@ def reflect_outwards(value, chart, covered, nearest, plane_row, plane, max_dista
                     step = 2 * depth - step
             rr = qr + _round_ratio(dr * step, distance)
             cc = qc + _round_ratio(dc * step, distance)
-            # Multiply the value at m by the ratio of the plane at p and at m.
+            # Multiply the value at m by plane(p) / plane(m).
             outside = smaller(1.0, SLOPE_REACH / distance)
             inside = smaller(1.0, SLOPE_REACH / step) if step > 0 else 1.0
             at = plane_row[qr, qc]

@@ -2,10 +2,11 @@
 """Kernels that limit the change of a denoised page by the standard error of its noisy samples.
 
 1. The mean difference between the noisy and the denoised page over a window of 5 x 5 texels is limited to
-   `MEAN_SIGMAS` of its standard errors, because a denoiser should remove noise but no light.
-2. Each texel's change is limited to `TEXEL_SIGMAS` of its standard errors and to the range of the noisy
-   values in the window.
-3. The result is averaged with the noisy value by inverse variance, so a converged page does not change.
+`MEAN_SIGMAS` times the standard error of this mean, because a denoiser should remove noise but no light.
+2. The change of each texel is limited to `TEXEL_SIGMAS` times its standard error, and the result to the range
+of the noisy values in the window.
+3. The result and the noisy value are averaged, weighted by inverse variance. So a converged page does not
+change.
 """
 
 from __future__ import annotations
@@ -19,12 +20,13 @@ from baker.trace.jit import kernel, larger, scratch, smaller
 
 # Half side of the window, texels.
 RADIUS = 2
-# Largest mean difference of a window that is attributed to noise, in standard errors of that mean.
+# Largest mean difference of a window that is attributed to noise, as a multiple of the standard error of this
+# mean.
 MEAN_SIGMAS = 2.5
-# Largest change of a texel, in its standard errors.
+# Largest change of a texel, as a multiple of its standard error.
 TEXEL_SIGMAS = 5.0
-# Assumed relative error of the filter itself. Measured: 0.1 to 0.5 % on noise-free pages with contact
-# shadows.
+# Assumed relative error of the filter itself. On noise-free pages with contact shadows, 0.1 to 0.5 % was
+# measured.
 OWN_ERROR = 0.005
 # Assumed relative error of the filter within two texels of a chart's border, where the covered part of texels
 # changes in steps from row to row.
@@ -109,8 +111,8 @@ def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_
                         residual[j] += w * (sample - float(denoised[rr, cc, j]))
                         extent[0, j] = smaller(extent[0, j], sample)
                         extent[1, j] = larger(extent[1, j], sample)
-            # Take at least the mean error of the window: a texel without rare bright samples underestimates
-            # its own error.
+            # Use at least the mean error of the window, because the standard error of a texel is
+            # underestimated if the texel has none of the rare bright samples.
             texel_error = math.sqrt(larger(se / sw, float(error[r, c]) ** 2))
             own_error = OWN_ERROR if n == (2 * RADIUS + 1) ** 2 else OWN_ERROR_BORDER
             mean_error = texel_error * math.sqrt(sww) / sw
@@ -120,7 +122,7 @@ def hold_to_samples(noisy, denoised, chart, covered, error, out, first_row, end_
                 + _BLUE * float(denoised[r, c, 2])
             )
             for j in range(3):
-                # Scale the error of the luminance to the channel: assume the same relative noise.
+                # Scale the error of the luminance to the channel, assuming the same relative noise.
                 scale = 1.0
                 if luminance > 0.0:
                     scale = smaller(larger(float(denoised[r, c, j]) / luminance, 0.0), 8.0)

@@ -1,18 +1,18 @@
 # mypy: disable-error-code="no-untyped-def"
 """Kernels that restore the light that the denoiser removed from a page, by sums over blocks of texels.
 
-A group is the set of chosen texels of one chart in one block. The window of a group consists of the groups of
-the same chart in the surrounding 5 x 5 blocks.
+The page is divided into blocks. A group is the set of chosen texels of one chart in one block. The window of
+a group consists of the groups of the same chart in the surrounding 5 x 5 blocks.
 """
 
 from __future__ import annotations
 
 from baker.trace.jit import inner, kernel, larger, smaller
 
-# Side of a block, texels; half side of a window, blocks. The weight of a block falls linearly with its
-# distance from the window's centre.
+# BLOCK: side of a block, texels. REACH: half side of a window, blocks. The weight of a block in a window
+# falls linearly with its distance from the window's centre.
 BLOCK, REACH = 8, 2
-# Weighted number of texels in a window for which half of the missing light is restored.
+# Weighted number of texels in a window. With this number, half of the missing light is restored.
 HALF = 30.0
 # Smallest and largest relative change of a texel.
 LEAST, MOST = -0.5, 1.0
@@ -61,11 +61,11 @@ def _group_of(begin, end, owner, chart):
 
 @kernel
 def sum_groups(noisy, filtered, label, light, sums):
-    """Sum removed and kept light over the texels of each group, divided by the group's mean light.
+    """For each group, sum the light that the denoiser removed and kept, divided by the mean light.
 
     noisy, filtered : (H, W, C) float32; label : (H, W) int32, group of each texel or -1
     light : (G, 2) float64 zeros, receives for each group the sum of `filtered` over texels and channels, and
-        the number of texels; their quotient is the mean light
+        the number of texels; the quotient of both is the mean light
     sums : (G, 2 C + 1) float64 zeros, receives for each group the C sums of (noisy - filtered) / mean light,
         the C sums of filtered / mean light, and the number of texels
     """
@@ -93,8 +93,9 @@ def sum_groups(noisy, filtered, label, light, sums):
 def missing_shares(first, owner, across, sums, share):
     """Write the relative change of each group that restores the light removed in the window around it.
 
-    The change is (removed / kept) * n / (n + HALF) for sums of removed and kept light over a window of n
-    texels. The second factor reduces the change for few texels, because their sums are noisy.
+    The change is (removed / kept) * n / (n + HALF), where `removed` and `kept` are weighted sums of light
+    over the window, and n is its weighted number of texels. The factor n / (n + HALF) reduces the change if
+    the window has few texels, because their sums are noisy.
 
     share : (G, C) float64 output, relative change, limited to LEAST and MOST
     first : (blocks + 1,) int64, first group of each block; owner : (n,) int32, chart of each group
@@ -127,7 +128,8 @@ def missing_shares(first, owner, across, sums, share):
 def add_shares(label, first, owner, across, share, page):
     """Multiply each texel of a page by 1 + share, with shares interpolated bilinearly between block centres.
 
-    If a neighbouring block has no texel of the same chart, the share of the texel's own group is used for it.
+    If a neighbouring block has no group of the same chart, the share of the texel's own group is used
+    instead.
 
     label : (H, W) int32, first : (blocks + 1,) int64, owner : (n,) int32, from `group_blocks`
     across : int, number of blocks in a row of blocks

@@ -13,31 +13,32 @@ from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
 # Half side of a window, texels.
 RADIUS = 2
-# Ridge term on the diagonal of the normal equations, texels^2 times the sum of weights. If all texels lie on
-# one line, the slope across that line becomes 0.
+# Ridge term, which is multiplied by the sum of weights and added to the diagonal of the normal equations,
+# texels^2. If all texels lie on one line, it makes the slope across that line 0.
 RIDGE = 1e-3
-# Largest excess of a result over the range of the window's values, as a share of that range.
+# Largest amount by which a result may exceed the range of the window's values, as a share of that range.
 HEADROOM = 0.5
-# Largest excess in units of the differences between the last three texels (see `_trend`): STEEP times the
-# smaller of the last difference and CURVED times the difference before it.
+# Factors in a second limit of that amount. Per texel of distance, it is STEEP times the smaller of two
+# numbers: the last difference between texels, and CURVED times the difference before it (see `_trend`).
 STEEP, CURVED = 2.0, 3.0
-# Share of the variance in the window that a plane must explain before a value may exceed its chart's largest.
+# Share of the variance in the window that the plane explains. Up to it, a result may not exceed the largest
+# value of the chart.
 STRAIGHT = 0.95
-# Distance from the chart beyond which extrapolated values are constant, texels.
+# Distance from the chart, texels. Beyond it, extrapolated values are constant.
 MAX_STEP = 2.0
-# Part of the change made by `match_lookups` that is discarded, as a share of the texel's value. A bilinear
-# lookup uses few texels and is noisier than a plane.
+# Amount by which the change that `match_lookups` makes is reduced, as a share of the texel's value. It is
+# reduced because a bilinear lookup uses few texels, and is therefore noisier than a plane.
 NOISY = 0.03
-# A slope on a noisy page is multiplied by 1 - DOUBT / F, where F is the slope's variance ratio (F-test).
-# Noise alone gives F = 1 on average.
+# A slope on a noisy page is multiplied by max(1 - DOUBT / F, 0), where F is the slope's variance ratio
+# (F-test). Noise alone gives F = 1 on average.
 DOUBT = 3.0
 # Constants in the weight of a texel, texels^2: weight = 1 / (FLAT + distance^2). On noisy pages NOISY_FLAT
 # replaces FLAT, which makes the weights more uniform.
 FLAT, NOISY_FLAT = 1.0, 4.0
 
-# Columns of the sums over a window, with weight w and position (x, y): sums of w, w x, w y, w x x, w x y and
-# w y y, and the number of texels. For each channel with value v: sums of w v, w x v, w y v and w v v, and the
-# smallest and largest v.
+# Columns of the sums over a window of texels with weights w and positions (x, y): sums of w, w x, w y, w x x,
+# w x y and w y y, and the number of texels. Then follow, for each channel with values v, the sums of w v, w x
+# v, w y v and w v v, and the smallest and the largest v.
 W, WX, WY, WXX, WXY, WYY, COUNT = range(7)
 WV, WXV, WYV, WVV, LOW, HIGH = range(6)
 N_COLUMNS, N_CHANNEL_COLUMNS = 7, 6
@@ -46,7 +47,8 @@ N_COLUMNS, N_CHANNEL_COLUMNS = 7, 6
 # explains.
 CENTRE, ACROSS, DOWN, LOWEST, HIGHEST, SPREAD, EXPLAINED = range(7)
 N_PLANE = 7
-# Columns of a trend: by how much values may increase and decrease beyond the window, see `_trend`.
+# Columns of a trend: by how much values may exceed the largest and fall below the smallest value of the
+# window, see `_trend`.
 RISE, FALL = range(2)
 
 MAX_CHANNELS = 16
@@ -69,8 +71,8 @@ def _sum_window(value, chart, covered, offset, r, c, radius, flat, sums):
     value : (H, W, C) float32; chart : (H, W) int32; covered : (H, W) bool
     offset : (H, W, 2) float32, column and row offset of each value's position from its texel centre, texels;
         of shape (0, 0, 2) if all offsets are zero
-    sums : (N_COLUMNS + N_CHANNEL_COLUMNS C,) float64 output, see the column names; x and y are relative to
-        the position of texel (r, c)
+    sums : (N_COLUMNS + N_CHANNEL_COLUMNS C,) float64 output, columns as described at W and WV; x and y are
+        relative to the position of texel (r, c)
     """
     height, width, channels = value.shape
     placed = offset.shape[0] > 0
@@ -149,9 +151,9 @@ def _step(along, length):
 def _trend(value, chart, covered, r, c, x, y, trend):
     """Write the largest plausible increase and decrease of values from texel (r, c) to (r + y, c + x).
 
-    Both limits are derived from the differences between the last three texels towards (r, c) in that
-    direction (see `STEEP`). If these two differences have different signs, both limits are 0. The signs
-    differ at shadow edges, between different faces and in noise.
+    Both limits are derived from the two differences between the last three texels, which end at (r, c) in
+    that direction (see `STEEP`). If the two differences have different signs, as at shadow edges, between
+    different faces and in noise, both limits are 0.
 
     value : (H, W, C) float32; chart : (H, W) int32; covered : (H, W) bool
     trend : (C, 2) float64 output, columns RISE and FALL, both >= 0
@@ -180,8 +182,8 @@ def _trend(value, chart, covered, r, c, x, y, trend):
 def _limited(planes, slot, j, estimate, trend, highest):
     """Return an estimate for channel j, limited to the range of the window extended by the trend.
 
-    If all values in the window are >= 0, the result is >= 0. It exceeds `highest` only if the plane explains
-    more than `STRAIGHT` of the variance in the window.
+    If all values in the window are >= 0, the result is >= 0. The result exceeds `highest` only if the plane
+    explains more than `STRAIGHT` of the variance in the window.
 
     planes : (slots, C, N_PLANE) float64, of which planes[slot] is read; trend : (C, 2) float64
     highest : float, largest value of the chart
@@ -219,7 +221,7 @@ def move_to_centre(value, chart, covered, offset, smallest, highest, out, first_
     offset : (H, W, 2) float32
         Centroid minus texel centre (column, row), texels.
     smallest : float
-        Texels whose offset is below this along both axes are not changed, texels.
+        Smallest offset, texels. Texels whose offset is smaller along both axes are not changed.
     highest : (n_charts, C) float32
         Largest value of each chart.
     out : (H, W, C) float32, changed in rows first_row to end_row - 1
@@ -242,9 +244,9 @@ def move_to_centre(value, chart, covered, offset, smallest, highest, out, first_
 def match_lookups(value, chart, covered, offset, smallest, highest, moved, out, first_row, end_row):
     """Set each partly covered texel so that a bilinear lookup at its centroid returns its mean.
 
-    A texel is changed only if all texels of that lookup are covered and in its chart. The difference to the
-    result of `move_to_centre` is reduced by NOISY times the mean, because that result is less noisy: it comes
-    from a plane through many texels.
+    A texel is changed only if all texels of this lookup are covered and in its chart. The difference from the
+    result of `move_to_centre` is reduced by NOISY times the texel's mean, because the result of
+    `move_to_centre` is less noisy: it is computed from a plane through many texels.
 
     Parameters
     ----------
@@ -301,7 +303,7 @@ def extrapolate_outwards(value, chart, covered, nearest, offset, highest, pixels
     """
     width, channels = value.shape[1], value.shape[2]
     sums, trend = _sums(), _trends()
-    # Cache planes, since many texels use the same one: slot s holds the plane of the texel source[s] - 1.
+    # Cache planes, because many texels use the same plane. Slot s holds the plane of the texel source[s] - 1.
     planes, source = _kept_planes(), _kept_sources()
     for r in range(first_row, end_row):
         for c in range(width):
@@ -349,7 +351,8 @@ def noisy_planes(value, chart, covered, offset, texel, radius, out):
         r, c = texel[k] // width, texel[k] % width
         fit_plane(value, chart, covered, offset, r, c, radius, NOISY_FLAT, sums, planes, 0)
         for j in range(value.shape[2]):
-            # Reduce the slope by its F ratio: explained over unexplained variance, per degree of freedom.
+            # Reduce the slope by its F ratio: explained variance divided by unexplained variance, each per
+            # degree of freedom.
             explained, spread = planes[0, j, EXPLAINED], planes[0, j, SPREAD]
             trust = 0.0
             if sums[COUNT] > 3.0 and explained > 0.0:

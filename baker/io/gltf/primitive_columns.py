@@ -15,14 +15,14 @@ from baker.core.scene import SourceDocument
 from baker.io.gltf.accessor_bytes import gather_rows
 from baker.io.gltf.packer import Json, objects
 
-# Extensions of primitives and meshes that neither contain vertices nor depend on their order.
+# Extensions of primitives and meshes that neither contain vertex data nor depend on the order of vertices.
 _HARMLESS = frozenset({"KHR_materials_variants"})
 _FLOAT = 5126
 _COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
 def read_columns(source: SourceDocument, primitive: Json) -> dict[str, NDArray[np.uint8]]:
-    """Return the bytes of each vertex attribute of a primitive, so that vertices can be compared.
+    """Return the bytes of the vertex attributes of a primitive, by which vertices are compared.
 
     Parameters
     ----------
@@ -34,9 +34,9 @@ def read_columns(source: SourceDocument, primitive: Json) -> dict[str, NDArray[n
     Returns
     -------
     dict of str to (V, B) uint8
-        Attribute name to the bytes of its V elements. In float attributes, except application-specific ones
-        (`_NAME`), -0 is replaced by 0. An attribute that is malformed or has fewer elements than POSITION is
-        left out.
+        For each attribute name, the B bytes of each of the V vertices. In float attributes, -0 is replaced by
+        0, except in application-specific attributes, whose names begin with `_`. An attribute that is
+        malformed or has fewer elements than POSITION is left out.
 
     Raises
     ------

@@ -13,8 +13,8 @@ def count_overlap(corner, group, base, stride, rows, slack, mark, covered, doubl
     """Mark the samples that each triangle covers, and count the samples that were covered before.
 
     Sample (r, c) of a grid is at (c + 0.5, r + 0.5), in units of the sample spacing. A triangle covers a
-    sample that is inside it, at a distance of more than `slack` from each edge. So triangles that share an
-    edge do not overlap, even if the edge is rounded.
+    sample if the sample is inside and more than `slack` away from each edge. So triangles that share an edge
+    do not overlap, even if the vertices of the edge are rounded.
 
     Parameters
     ----------
@@ -23,14 +23,15 @@ def count_overlap(corner, group, base, stride, rows, slack, mark, covered, doubl
     group : (T,) int64
         Group of each triangle, which determines its grid and counters.
     base, stride, rows : (G,) int64
-        Index in `mark` of the first sample of each group's grid, number of its columns, and number of its
+        For the grid of each group: index in `mark` of its first sample, number of columns, and number of
         rows. Groups may share a grid.
     slack : float, sample spacings
         Smallest distance of a covered sample from the edges.
     mark : (M,) uint8
         In and out, for each sample: 0 free, 1 covered once, 2 covered more than once.
     covered, doubled : (G,) int64
-        Out: number of samples that the group's triangles cover, and number of those that were covered before.
+        Out: number of samples that the group's triangles cover, and number of these samples that were covered
+        before.
     """
     for t in range(len(corner)):
         g = group[t]
@@ -43,7 +44,7 @@ def count_overlap(corner, group, base, stride, rows, slack, mark, covered, doubl
         if turn < 0.0:
             bx, by, cx, cy = cx, cy, bx, by
         # The signed distance of a sample from an edge is a cross product divided by the length of the edge.
-        # The tests below multiply `slack` by the length instead.
+        # The tests below compare the cross product with `slack` times the length instead.
         l0 = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
         l1 = math.sqrt((cx - bx) ** 2 + (cy - by) ** 2)
         l2 = math.sqrt((ax - cx) ** 2 + (ay - cy) ** 2)
@@ -74,7 +75,7 @@ def count_overlap(corner, group, base, stride, rows, slack, mark, covered, doubl
 
 @kernel
 def mark_charts(corner, chart, owner):
-    """Write the chart of each triangle, plus 1, to each free texel whose square the triangle enters.
+    """Write the chart number of each triangle, plus 1, to each free texel whose square the triangle enters.
 
     Parameters
     ----------
@@ -86,7 +87,7 @@ def mark_charts(corner, chart, owner):
         In and out: chart of each texel plus 1; 0 for free texels.
     """
     height, width = owner.shape
-    # Distance, texels, by which a triangle must extend into a texel to enter it.
+    # Smallest distance, texels, by which a triangle that enters a texel extends into it.
     slack = 1e-4
     for t in range(len(corner)):
         y_low = smaller(smaller(corner[t, 0, 1], corner[t, 1, 1]), corner[t, 2, 1])
@@ -94,7 +95,7 @@ def mark_charts(corner, chart, owner):
         for r in range(
             larger(0, math.floor(y_low + slack)), smaller(height - 1, math.ceil(y_high - slack) - 1) + 1
         ):
-            # Range of x in which the triangle crosses row r.
+            # Compute the range of x in which the triangle crosses row r.
             x_low, x_high = 1e30, -1e30
             for k in range(3):
                 ax, ay = corner[t, k, 0], corner[t, k, 1]

@@ -1,11 +1,11 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Rasterises chart outlines conservatively, and places them in a page by first fit from the lowest row up.
+"""Rasterises chart outlines conservatively, and places them in a page by first fit, from the lowest row up.
 
-An outline is one span of texels for each row. The search for free space skips whole runs of used texels, so
-that its time hardly depends on the size of the page.
+An outline consists of one span of texels for each row. The search for free space skips whole runs of used
+texels, so that its time hardly depends on the size of the page.
 
 Based on: Lévy, Petitjean, Ray, Maillot, *Least Squares Conformal Maps for Automatic Texture Atlas
-Generation*, 2002 (packing along outlines). In addition, free space below outlines is used here.
+Generation*, 2002 (packing along outlines). Unlike that method, this one also uses free space below outlines.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ def outline_spans(corner, first_triangle, shape, scale, first_row, low, high):
     corner : (T, 3, 2) float64, metres
         Corners of the triangles of all shapes. The lower corner of each shape is at 0.
     first_triangle : (S + 1,) int64
-        Triangles of shape s: `first_triangle[s]` to `first_triangle[s + 1]` - 1.
+        Shape s has the triangles `first_triangle[s]` to `first_triangle[s + 1]` - 1.
     shape : (n,) int64
         Indices of the shapes to rasterise.
     scale : (S, 2) float64, texels per metre
         Scale of each shape along u and v.
     first_row : (S + 1,) int64
-        Rows of shape s in `low` and `high`: `first_row[s]` to `first_row[s + 1]` - 1.
+        Shape s has the items `first_row[s]` to `first_row[s + 1]` - 1 of `low` and `high`, one for each row.
     low, high : (R,) int32
-        In: a large number and -1. Out: column of the first and of the last texel that the shape touches in
-        this row. Texel k spans k - 0.5 to k + 0.5.
+        In: a large number (`low`) and -1 (`high`). Out: columns of the first and of the last texel that the
+        shape touches in this row. Texel k spans k - 0.5 to k + 0.5.
     """
     for s in shape:
         row0 = first_row[s]
@@ -90,10 +90,10 @@ def _fill(next_used, next_free, y, start, end):
 
 @inner
 def _find(next_used, next_free, low, high, row0, n_rows, margin, y_start):
-    """Return the position (x, y) at which an outline fits, in the lowest row and there leftmost, or (-1, -1).
+    """Return the lowest and then leftmost position (x, y) at which an outline fits, or (-1, -1).
 
     next_used, next_free : (H, W + 1) int16, see `place_items`
-    low, high : (R,) int32, see `outline_spans`. The outline is rows `row0` to `row0 + n_rows` - 1
+    low, high : (R,) int32, see `outline_spans`; the outline is items `row0` to `row0 + n_rows` - 1
     margin : number of empty texels along the page border; y_start : lowest row to test
     """
     height = next_used.shape[0]
@@ -127,8 +127,9 @@ def place_items(next_used, next_free, order, item_shape, first_row, low, high, g
     Parameters
     ----------
     next_used, next_free : (H, W + 1) int16
-        In and out, for each texel of the page: column of the next used and of the next free texel in its row,
-        at or after it. On an empty page, `next_used` is W and `next_free` is the texel's own column.
+        In and out, for each texel of the page: the columns of the first used texel and of the first free
+        texel of its row, from this texel on; W if there is none. On an empty page, `next_used` is W and
+        `next_free` is the texel's own column.
     order : (N,) int64
         Indices of the items to place, in this order.
     item_shape : (I,) int64
