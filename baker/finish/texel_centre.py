@@ -6,8 +6,8 @@ corrections are made:
 
 1. A plane fitted to neighbouring texels extrapolates the value to the texel centre.
 2. The value is changed so that a bilinear lookup at the centroid, which interpolates between the texel and
-its extrapolated neighbours, returns the mean. This reduces the error if light falls off faster than linearly,
-as at a narrow gap.
+   its extrapolated neighbours, returns the mean. This reduces the error if light falls off faster than
+   linearly, as at a narrow gap.
 
 *Measured* RMS error of lookups within half a texel of the border:
 

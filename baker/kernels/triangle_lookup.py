@@ -23,7 +23,7 @@ from baker.trace.jit import inner, larger, smaller
 #     DOUBLE_SIDED           1 if the back has texel entries, else 0
 #     FACE_NORMAL            unit normal of the front, world (3)
 #     FACE_AREA              m2
-#  EMITTER                code of the triangle's emitters, see `kernels.emitters.emitter_at`; -1 for none
+#     EMITTER                code of the triangle's emitters, see `kernels.emitters.emitter_at`; -1 for none
 #     MATERIAL               number of the material, a whole number
 UV, UV_EDGE_1, UV_EDGE_2, PAGE, DOUBLE_SIDED = 0, 2, 4, 6, 7
 FACE_NORMAL, FACE_AREA, EMITTER, MATERIAL = 8, 11, 12, 13

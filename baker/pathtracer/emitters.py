@@ -32,14 +32,14 @@ from baker.lights.emissive_texture import EmissiveTextures, Parts, brightness, c
 #     EMITTER_CHANCE      probability with which it is chosen
 #     EMITTER_RADIANCE    radiance without texture, cd/m2 (3)
 #     EMITTER_TEXTURED    1 if it has a texture, else 0
-#  EMITTER_PART         position in the scene's triangle (3): barycentrics b1, b2 of the emitter's corner 0;
-#                       edge length divided by the triangle's edge length, negative if the part is rotated
-#                       by 180 degrees. (0, 0, 1) for a whole triangle
+#     EMITTER_PART        position in the scene's triangle (3): barycentrics b1, b2 of the emitter's corner 0;
+#                         edge length divided by the triangle's edge length, negative if the part is
+#                         rotated by 180 degrees. (0, 0, 1) for a whole triangle
 EMITTER_CORNER, EMITTER_NORMAL, EMITTER_AREA, EMITTER_TWO_SIDED, EMITTER_CHANCE = 0, 9, 12, 13, 14
 EMITTER_RADIANCE, EMITTER_TEXTURED, EMITTER_PART = 15, 18, 19
 EMITTER_COLUMNS = 24
 # Largest number of parts of all textured triangles, minus the number of textured triangles. Four times the
-# number of bakes.
+# limit of bakes, `lights.emissive.MOST_PARTS`.
 MAX_PARTS = 131072
 # Longest edge of a part, as a share of the scene's diagonal. Parts up to this size that are at most one texel
 # of the texture wide are not cut further.

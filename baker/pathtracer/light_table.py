@@ -44,12 +44,13 @@ from baker.trace.jit import inner
 
 _LUMINANCE = np.array(LUMINANCE_WEIGHTS)
 # Columns of a light without area, from its `EmissionProfile`:
-#  DELTA_FORM            form of the profile: EVEN, CONE, PARALLEL or TABULATED
+#
+#     DELTA_FORM            form of the profile: EVEN, CONE, PARALLEL or TABULATED
 #     DELTA_POSITION        metres, relative to the geometry's origin; 0 for parallel light (3)
 #     DELTA_AXIS            unit direction in which the light shines (3)
 #     DELTA_INTENSITY       cd, or lx for parallel light (3)
 #     DELTA_MIN_COSINE      cosine of the largest angle to the axis
-#  DELTA_CONE_SCALE      `EmissionProfile.cone_scale`; 0 if None
+#     DELTA_CONE_SCALE      `EmissionProfile.cone_scale`; 0 if None
 #     DELTA_CHANCE          probability with which the light is chosen
 #     DELTA_INVERSE_RANGE   1 / range^2, 1/m2; 0 without a range
 #     DELTA_TANGENT         unit direction of azimuth 0, if tabulated (3)
@@ -80,7 +81,7 @@ EVEN, CONE, PARALLEL, TABULATED = 0.0, 1.0, 2.0, 3.0
 #     ROW_MIN_COSINE      DELTA_MIN_COSINE of a light without area
 #     ROW_CONE_SCALE      DELTA_CONE_SCALE of a light without area
 #     ROW_RADIANCE        radiance of an emitter without texture or of the sky; intensity of other lights (3)
-#  ROW_KIND              a constant KIND_EMITTER to KIND_TABULATED
+#     ROW_KIND            a constant from KIND_EMITTER to KIND_TABULATED
 ROW_ORIGIN, ROW_EDGE, ROW_NORMAL, ROW_GAIN, ROW_TWO_SIDED = 0, 3, 9, 12, 13
 ROW_MIN_COSINE, ROW_CONE_SCALE, ROW_RADIANCE, ROW_KIND = 14, 15, 16, 19
 ROW_INVERSE_RANGE = ROW_TWO_SIDED

@@ -203,7 +203,7 @@ def open_rays(  # type: ignore[no-untyped-def]
         points are close together
     name : (m,) int64, numbers of the points, on which their random numbers depend
     memory : `PathMemory`
-    arguments : (2, 5) int64, `packets.arguments_of` incoherent packets, and of coherent packets
+    arguments : (2, 5) int64, from `packets.arguments_of`; row 0 for incoherent, row 1 for coherent packets
     sobol_points : (n, 2) uint32, bit-reversed Sobol points of the n samples of a pass
     shared : uint32, mask of the bits of bit-reversed random numbers that are the same for all points
     max_distance : float32, metres, length of the rays

@@ -42,7 +42,7 @@ _L = BLOCK_WIDTH
 # Rows after those of the packet. State of a path:
 #
 #     BETA      throughput (3)
-#  DENSITY  density, per steradian, of the ray's direction; 0 if emission at its hit has the MIS weight 1
+#     DENSITY   density, per steradian, of the ray's direction; 0 if emission at its hit has MIS weight 1
 #     COSINE    cosine of the ray's direction to the shading normal at its origin
 #     BOUNCES   number of reflections; -1 before the first hit of a camera ray
 #     POINT     row of the path's point in the tile's sums

@@ -56,8 +56,8 @@ from baker.trace.jit import inner
 #     GO          unit direction of the next ray (3)
 #     BETA        throughput (3)
 #     COLLECTED   light found so far (3)
-#  DENSITY     density, per steradian, with which GO was sampled; 0 if emission at the next hit has the MIS
-#              weight 1
+#     DENSITY     density, per steradian, with which GO was sampled; 0 if emission at the next hit has MIS
+#                 weight 1
 #     NORMAL      unit geometric normal, on the side that was hit (3)
 #     FRAME       tangent, bitangent and shading normal (9)
 #     TO          unit direction to the previous vertex, in FRAME (3)

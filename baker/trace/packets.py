@@ -50,8 +50,7 @@ BLEND_GEOMETRY = np.uint32(2)
 PASSES, UNAWARE, SOLID = PACKET_WIDTH, np.uint32(2 * PACKET_WIDTH + 1), np.uint32(2 * PACKET_WIDTH + 2)
 # Layout of the memory at the address of the query context, which filter functions of BLEND triangles read.
 # Offsets are in four-byte words. RTCRayQueryContext comes first, then `BlendBuffers.stop`, `.transmittance`
-# and `.edges`, then
-# EDGE_HITS pairs for each ray. A pair is the distance and the surface of a hit on an edge.
+# and `.edges`, and then, for each ray, EDGE_HITS pairs of the distance and the surface of a hit on an edge.
 EDGE_HITS = 32
 BLEND_STOP, BLEND_TRANSMITTANCE, BLEND_EDGES = 16, 16 + PACKET_WIDTH, 16 + 4 * PACKET_WIDTH
 BLEND_EDGE_HITS = BLEND_EDGES + PACKET_WIDTH

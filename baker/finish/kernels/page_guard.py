@@ -2,11 +2,11 @@
 """Kernels that limit the change of a denoised page by the standard error of its noisy samples.
 
 1. The mean difference between the noisy and the denoised page over a window of 5 x 5 texels is limited to
-`MEAN_SIGMAS` times the standard error of this mean, because a denoiser should remove noise but no light.
+   `MEAN_SIGMAS` times the standard error of this mean, because a denoiser should remove noise but no light.
 2. The change of each texel is limited to `TEXEL_SIGMAS` times its standard error, and the result to the range
-of the noisy values in the window.
+   of the noisy values in the window.
 3. The result and the noisy value are averaged, weighted by inverse variance. So a converged page does not
-change.
+   change.
 """
 
 from __future__ import annotations

@@ -32,10 +32,11 @@ from baker.trace.packets import (
 )  # fmt: skip
 
 # Values of `target` that are not patches:
-# LOST        the ray ended on the back of a one-sided surface, or on a surface without a texel
+#
+#     LOST        the ray ended on the back of a one-sided surface, or on a surface without a texel
 #     SKY         the ray left the scene
-# SPLIT - s   the ray hit a split texel, which another surface divides into sides (`radiosity.sides`);
-#             s is its row in the `SideTable`
+#     SPLIT - s   the ray hit a split texel, which another surface divides into sides (`radiosity.sides`);
+#                 s is the texel's row in the `SideTable`
 LOST, SKY, SPLIT = -1, -2, -3
 # Columns of `tally`: number of rays that left the scene, and number of rays whose target is LOST.
 ESCAPED, ABSORBED = 0, 1
@@ -199,9 +200,9 @@ def merge_reciprocal_estimates(
 
         F_ij' = (F_ij + F_ji) A_j / (A_i + A_j)
 
-    All patches cast the same number of rays, R. So the variance of the estimate of A_i F_ij is about A_i (A_i
-    F_ij) / R. Because A_i F_ij = A_j F_ji, the variances of both estimates are in the ratio A_i : A_j.
-    Therefore the optimal weight of F_ij is A_j / (A_i + A_j), and the optimal weight of the reciprocal
+    All patches cast the same number of rays, R. So the variance of the estimate of A_i F_ij is about A_i x /
+    R, with x = A_i F_ij. Because A_i F_ij = A_j F_ji, the variances of both estimates are in the ratio A_i :
+    A_j. Therefore the optimal weight of F_ij is A_j / (A_i + A_j), and the optimal weight of the reciprocal
     estimate is A_i / (A_i + A_j).
 
     first (P + 1,) int64, column (nnz,) int32, value (nnz,) float32 : F in CSR, columns of a row ascend

@@ -31,7 +31,7 @@ _f = np.float32
 #     _ORIGIN, _NORMAL   position and normal of the point (3 each)
 #     _ARM               vectors from the point to up to four corners (12)
 #     _HEIGHT            heights of the triangle's three corners above the tangent plane (3)
-#  _SUM                 sum over the edges of angle_i Gamma_i . n
+#     _SUM               sum over the edges of angle_i Gamma_i . n
 #     _SMALL             E / L of a triangle that is treated as a point, -1 for other triangles
 #     _FACING            1 if a side that emits faces the point, else 0
 _ORIGIN, _NORMAL, _ARM, _HEIGHT, _SUM, _SMALL, _FACING = 0, 3, 6, 18, 21, 22, 23

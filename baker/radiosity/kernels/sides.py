@@ -2,15 +2,15 @@
 """Texels with points on both sides of another surface that passes through them.
 
 For example, a floor that continues under a wall has texels with points on both sides of the wall. Two points
-of a texel are on the same side if a segment between them is not blocked. The ends of the segment are raised
-along the normals of the points by
+of a texel are on the same side if a segment between them is not blocked. The segment runs above the surface.
+The height of a point is
 
     height = min(HIGH s, headroom / 2)        s: side of the texel, metres
 
-The headroom of a point is the free distance along its normal. Both ends are raised by the smaller of the two
-points' heights. So a step lower than that height does not separate two points, and an opening lower than that
-height does not connect them. The same test finds the side on which a ray's hit lies
-(`radiosity.kernels.side_table`).
+The headroom of a point is the free distance along its normal. Both ends of a segment are raised along the
+normals by the smaller of the two points' heights. So a step lower than that height does not separate two
+points, and an opening lower than that height does not connect them. The same test finds the side on which a
+ray's hit lies (`radiosity.kernels.side_table`).
 """
 
 from __future__ import annotations
@@ -258,7 +258,7 @@ def hidden_corners(surface, chosen, origin, normal, height, valid_points, side, 
     surface : Surface; chosen : (m,) int64, texel entries
     origin, normal : (m, 16, 3) float32, metres and unit vectors, world; height : (m, 16) float32, metres
     valid_points : (m,) uint16, see `group_points`; side : (m,) float32, metres
-    buffers : PacketBuffers; hidden : (m,) uint8 output, 1 for these texels
+    buffers : PacketBuffers; hidden : (m,) uint8 output, 1 for the texels found
     Returns the number of rays cast.
     """
     position, shading, face = surface.position, surface.normal, surface.face_normal
