@@ -142,11 +142,11 @@ class Finisher:
     threads : int
         Number of threads.
     dilation : int
-        Texels by which charts are dilated into the padding.
+        Number of texels by which charts are dilated into the padding.
     denoiser : LightmapDenoiser or None
         The denoiser; None if layers are not denoised.
     progress : Progress
-        Gets the denoiser's progress; may cancel.
+        Called with the denoiser's progress; a truthy return value cancels.
     """
 
     threads: int
@@ -166,11 +166,11 @@ def open_finisher(
     threads : int
         Number of threads of the kernels and of the denoiser.
     dilation : int
-        Texels by which charts are dilated into the padding.
+        Number of texels by which charts are dilated into the padding.
     denoise : bool
         Whether layers are denoised.
     progress : Progress
-        Gets the denoiser's progress; may cancel.
+        Called with the denoiser's progress; a truthy return value cancels.
 
     Yields
     ------

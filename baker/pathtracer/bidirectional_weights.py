@@ -36,9 +36,9 @@ MAX_LIGHT_VERTICES = 8
 #
 #     BACK      unit direction to the previous vertex, world (3)
 #     INVERSE   1 / density, per area, with which this vertex was sampled
-#     OPEN      relative density of the technique that connects the previous vertex to this one. It is 1 with
-#               three exceptions. If the previous vertex reflected as a mirror: 0. If it is the camera:
-#               `n_subpaths` of `trace_both_ways`. If it is the sky: the ratio of densities in `reach_vertex`
+#     OPEN      relative density of the technique that connects the previous vertex to this one: 0 if the
+#               previous vertex reflected as a mirror, `n_subpaths` of `trace_both_ways` if it is the camera,
+#               the ratio of densities in `reach_vertex` if it is the sky, else 1
 #     LEAVE     cosine of the next ray to the geometric normal
 #     ORIGIN    before the first hit: 0 if the path started at a finite distance, 1 for parallel light, 2 for
 #               the sky. After the first hit: 0
@@ -192,7 +192,7 @@ def towards_light(path, k, density, reverse):
 def pixel_density(camera, direction):
     """Return the density, per steradian, of one pixel's camera rays in a direction; 0 behind the camera.
 
-    camera : (15,) float64, see `camera`; direction : (3,) float64, unit, from the camera
+    camera : (15,) float64, from `camera.camera_columns`; direction : (3,) float64, unit, from the camera
     """
     cosine = (
         direction[0] * camera[FORWARD]
@@ -209,7 +209,7 @@ def pixel_density(camera, direction):
 def pixel_of(camera, direction):
     """Return the number of the pixel through which a direction passes; -1 if it is outside the picture.
 
-    camera : (15,) float64, see `camera`; direction : (3,) float64, unit, from the camera
+    camera : (15,) float64, from `camera.camera_columns`; direction : (3,) float64, unit, from the camera
     """
     z = (
         direction[0] * camera[FORWARD]

@@ -2,7 +2,7 @@
 
     E = F (s + rho E)        F: form factors, s: direct light that patches reflect, rho: albedo
 
-With M = s + rho E, the radiosity without emission, and the patch areas A, this becomes
+With the exitance M = s + rho E, which is the radiosity without emission, and the patch areas A, this becomes
 
     (A / rho - A F) M = A s / rho
 
@@ -49,7 +49,8 @@ _PART = 250_000
 # exitance of the same colour. Because of this limit, nearly black patches do not delay the solve.
 _DARK = 1e-15
 # Ratio of the residual norm to its initial value. Below it, conjugate gradients are started again, because
-# the search directions have lost orthogonality, and the updated residual differs from the true residual.
+# the search directions have lost orthogonality, and the residual of the iteration differs from the true
+# residual.
 _REDUCTION = 1e-12
 # Upper limit of albedo: with albedo 1, a closed scene has no solution.
 MAX_ALBEDO = 0.999
