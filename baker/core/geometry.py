@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.atlas import Atlas
+from baker.core.errors import InputError
 from baker.core.scene import Scene
 
 
@@ -72,6 +73,11 @@ def world_geometry(scene: Scene, atlas: Atlas, origin: NDArray[np.float64] | Non
     -------
     Geometry
         The triangles of all instances, in the order of instances.
+
+    Raises
+    ------
+    InputError
+        If all vertices have the same position in float32.
     """
     origin = scene.origin if origin is None else origin
     columns: dict[str, list[NDArray[Any]]] = {name: [] for name in _COLUMNS}
@@ -104,13 +110,20 @@ def world_geometry(scene: Scene, atlas: Atlas, origin: NDArray[np.float64] | Non
         name: np.concatenate(parts) if parts else _COLUMNS[name] for name, parts in columns.items()
     }
     face_normal, area = face_normals(data["position"], data["triangle"])
-    return Geometry(
+    geometry = Geometry(
         **data,
         face_normal=face_normal,
         area=area,
         double_sided=double_sided[data["material"]],
         origin=origin,
     )
+    if len(geometry.position) and geometry.diagonal == 0.0:
+        raise InputError(
+            "all surfaces lie in one point, as far as 32-bit numbers can tell: the scene is too small, or"
+            " too far from the origin for its size; scale it up, or move it to the origin",
+            file=str(scene.path),
+        )
+    return geometry
 
 
 def face_normals(

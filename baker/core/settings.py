@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from baker.core.encoding import encoding_options, encodings_in_words
-from baker.core.errors import InputError, SettingsError
+from baker.core.errors import SettingsError
 from baker.core.light_limits import BRIGHTEST
 from baker.core.settings_model import (
     FILES,
@@ -141,11 +141,6 @@ class CommonSettings(Settings):
 
     def ao_reach(self, diagonal: float) -> float:
         """Return the AO distance in metres (may be inf) for a scene whose bounding box has this diagonal."""
-        if self.ao_distance.strip().endswith("%") and not diagonal > 0:
-            raise InputError(
-                "all surfaces lie in one point, as far as 32-bit numbers can tell: the scene is too small, or"
-                " too far from the origin for its size; scale it up, or move it to the origin"
-            )
         return ao_metres(self.ao_distance, diagonal)
 
 
