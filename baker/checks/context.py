@@ -15,13 +15,17 @@ from baker.checks.emission import Emission, find_emission
 from baker.checks.finding import Location
 from baker.checks.mesh_facts import MeshFacts
 from baker.checks.settings import DEFAULT_MIP
+from baker.checks.sorted_points import SortedPoints
 from baker.checks.uv_facts import UvFacts
 from baker.checks.world_triangles import WorldTriangles
-from baker.core.light_kind import check_light_kinds
+from baker.core.light_kind import check_light_kinds, light_positions
 from baker.core.parallel import thread_count
 from baker.core.scene import Mesh, Scene
 from baker.core.settings import BakeSettings
 from baker.core.source_mesh import SourceInstance, SourceMesh, SourcePrimitive, SourceScene
+
+# Number of vertices of each object in `CheckContext.test_points`.
+_TEST_POINTS = 8
 
 
 class CheckContext:
@@ -77,10 +81,44 @@ class CheckContext:
     @cached_property
     def first_instance(self) -> dict[int, SourceInstance]:
         """Return the first instance of each mesh, by mesh index."""
-        found: dict[int, SourceInstance] = {}
+        return {mesh: instances[0] for mesh, instances in self.instances_of.items()}
+
+    @cached_property
+    def instances_of(self) -> dict[int, list[SourceInstance]]:
+        """Return the instances of each mesh that has any, by mesh index."""
+        found: dict[int, list[SourceInstance]] = {}
         for instance in self.source.instances:
-            found.setdefault(instance.mesh, instance)
+            found.setdefault(instance.mesh, []).append(instance)
         return found
+
+    @cached_property
+    def node_named(self) -> dict[str, int]:
+        """Return the node of the first instance of each name."""
+        found: dict[str, int] = {}
+        for instance in self.source.instances:
+            found.setdefault(instance.name, instance.node)
+        return found
+
+    @cached_property
+    def test_points(self) -> SortedPoints:
+        """Return positions of lights and cameras (owner -1), and some vertices of objects (owner: the node).
+
+        In metres, world space.
+        """
+        scene = self.scene
+        seen = [*light_positions(scene), *(np.array(camera.position) for camera in scene.cameras)]
+        position = [np.array(seen, np.float64).reshape(-1, 3)]
+        owner = [np.full(len(seen), -1, np.int64)]
+        for instance in self.source.instances:
+            facts = self.meshes[instance.mesh]
+            if not len(facts.good):
+                continue
+            step = max(1, len(facts.good) // _TEST_POINTS)
+            matrix = instance.world_from_object
+            points = facts.corner[::step, 0][:_TEST_POINTS] @ matrix[:3, :3].T + matrix[:3, 3]
+            position.append(points)
+            owner.append(np.full(len(points), instance.node, np.int64))
+        return SortedPoints(np.concatenate(position), np.concatenate(owner))
 
     @cached_property
     def box(self) -> NDArray[np.float64]:
@@ -115,10 +153,18 @@ class CheckContext:
         )
 
     @cached_property
+    def mesh_with(self) -> dict[int, int]:
+        """Return the first mesh with good triangles of each material, by material index."""
+        found: dict[int, int] = {}
+        for m, facts in enumerate(self.meshes):
+            for k in np.unique(facts.material[facts.good]).tolist():
+                found.setdefault(k, m)
+        return found
+
+    @cached_property
     def used_materials(self) -> list[int]:
         """Return the indices of the materials that good triangles use, sorted."""
-        used = [np.unique(facts.material[facts.good]) for facts in self.meshes]
-        return [int(k) for k in np.unique(np.concatenate(used))] if used else []
+        return sorted(self.mesh_with)
 
     @cached_property
     def channels(self) -> tuple[Channel, ...]:

@@ -5,11 +5,13 @@ Each property is computed on first use and then stored.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.material_flags import flag_of_faces
 from baker.core.scene import Material
 from baker.core.source_mesh import SourceMesh
 from baker.topology.edges import Edges, find_edges
@@ -105,7 +107,7 @@ class MeshFacts:
         if self.trusted:
             return found
         rest = np.flatnonzero(self.usable & ~self.flat)
-        double_sided = np.array([m.double_sided for m in self.materials], bool)
+        double_sided = self.flag(self.material[rest], lambda m: m.double_sided)
         found[rest] = duplicates(self.position, self.triangle[rest], self.material[rest], double_sided)
         return found
 
@@ -139,7 +141,7 @@ class MeshFacts:
     @cached_property
     def double_sided(self) -> NDArray[np.bool_]:
         """Return (G,) bool: the good faces with a double-sided material."""
-        return np.array([m.double_sided for m in self.materials], bool)[self.material[self.good]]
+        return self.flag(self.material[self.good], lambda m: m.double_sided)
 
     @cached_property
     def welded(self) -> NDArray[np.int64]:
@@ -205,6 +207,10 @@ class MeshFacts:
         corner = corner - corner.mean(axis=(0, 1))
         six = np.einsum("gx,gx->g", corner[:, 0], 2.0 * self.area_vector[self.sheet])
         return np.bincount(self.piece, six / 6.0, minlength=self.n_pieces).astype(np.float64)
+
+    def flag(self, material: NDArray[np.int32], read: Callable[[Material], bool]) -> NDArray[np.bool_]:
+        """Return (n,) bool: the flag that `read` returns for each material index of `material` (n,)."""
+        return flag_of_faces(self.materials, material, read)
 
     def named(self, faces: NDArray[np.integer], most: int = 10) -> tuple[int, ...]:
         """Return the first `most` of the faces (n,) as numbers within their primitives."""

@@ -170,5 +170,9 @@ def cast(
     def work(i: int, j: int) -> None:
         first_hits(new_packet_buffers(tracer), a[i:j], b[i:j], c[i:j], d[i:j], triangle[i:j], distance[i:j])
 
+    if 0 < n <= _TILE:
+        # Start no threads for one tile: `check` casts a few rays for each mesh.
+        work(0, n)
+        return triangle, distance
     run_tiles(n, _TILE, work, threads=threads, stage=Stage.CHECKS, progress=silent)
     return triangle, distance

@@ -91,7 +91,7 @@ def choose_faces(primitive: EditablePrimitive) -> FaceChoice:
 def _n_at_same_positions(primitive: EditablePrimitive, triangle: NDArray[np.int64]) -> int:
     """Return how many of the faces (T, 3) have the same three positions as an earlier face."""
     material = np.zeros(len(triangle), np.int32)
-    sided = np.array([primitive.double_sided], bool)
+    sided = np.full(len(triangle), primitive.double_sided)
     return int(duplicates(primitive.arrays.position, triangle, material, sided).sum())
 
 

@@ -77,7 +77,8 @@ def new_lightmap_uv(
     if mesh is None:
         return plan, None
     # Leave out duplicate faces, as a bake does, so that they do not count as an overlap.
-    single = ~duplicates(mesh.position, mesh.triangle.astype(np.int64), mesh.material, np.zeros(1, bool))
+    sided = np.zeros(len(mesh.triangle), bool)
+    single = ~duplicates(mesh.position, mesh.triangle.astype(np.int64), mesh.material, sided)
     fault = find_fault(replace(mesh, triangle=mesh.triangle[single]), request.resolution)
     if fault is None:
         return plan, None

@@ -130,8 +130,8 @@ def duplicates(
         Vertex indices of each triangle.
     material : (T,) int32
         Material of each triangle.
-    double_sided : (M,) bool
-        Whether each material is double-sided.
+    double_sided : (T,) bool
+        Whether the material of each triangle is double-sided.
 
     Returns
     -------
@@ -167,7 +167,7 @@ def duplicates(
     left, left_face = order[~same], face[~same]
     pair = np.flatnonzero((left_face[1:] == left_face[:-1]).all(axis=1))
     one, two = candidate[left[pair]], candidate[left[pair + 1]]
-    double = (material[one] == material[two]) & double_sided[material[one]]
+    double = (material[one] == material[two]) & double_sided[one]
     repeated[np.maximum(one, two)[double]] = True
     return repeated
 

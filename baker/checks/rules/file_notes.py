@@ -48,7 +48,7 @@ def file_note(context: CheckContext) -> Iterator[RawFinding]:
     for warning in context.scene.warnings:
         if warning.code in NOTES:
             severity, advice = NOTES[warning.code]
-            node = next((i.node for i in context.source.instances if i.name == warning.object), None)
+            node = context.node_named.get(warning.object)
             text = f"{warning.message}; {advice}"
             yield RawFinding(
                 text, Location(warning.object, node), severity=severity, more={"note": warning.code}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +14,17 @@ from baker.checks.finding import RawFinding
 from baker.checks.mesh_facts import MeshFacts
 from baker.checks.rule import check
 from baker.checks.rules.bad_faces import faces_found
-from baker.core.light_kind import light_positions
+from baker.checks.sorted_points import SortedPoints
 from baker.topology.winding_number import first_inside
 
 # Largest value of |sum of area vectors| / total area for a closed mesh. It is 0 except for rounding.
 _ROUNDING = 1e-4
 # Share of a mesh's area. If the inside-out parts have less than this share, the finding is a warning.
 MOST_WRONG = 0.05
-# Number of points of each other part or object that are tested for being inside.
+# Number of points of each other part that are tested for being inside.
 _WITNESSES = 8
+# Condition number of a transform from which an object counts as flattened.
+_FLATTENED = 1e6
 
 
 @check(
@@ -72,12 +75,15 @@ def inside_out_parts(context: CheckContext, mesh: int) -> list[NDArray[np.int64]
         return []
     wrong = []
     suspect = np.flatnonzero(facts.closed & (facts.volume < 0))
-    emits = np.array([max(material.emission) > 0 for material in facts.materials], bool)
+    if not len(suspect):
+        return []
+    parts = _Parts(facts)
+    emits = facts.flag(facts.material[facts.good], lambda m: max(m.emission) > 0)
     for piece in suspect:
-        rows = facts.sheet[facts.piece == piece]
-        if facts.double_sided[rows].all() or emits[facts.material[facts.good[rows]]].any():
+        rows = parts.faces(int(piece))
+        if facts.double_sided[rows].all() or emits[rows].any():
             continue
-        if not _inhabited(context, mesh, rows, int(piece)):
+        if not _inhabited(context, mesh, parts, int(piece)):
             wrong.append(rows)
     return wrong
 
@@ -96,49 +102,58 @@ def _may_be(facts: MeshFacts) -> bool:
     return bool((outward < 0).any()) or total > _ROUNDING * float(facts.area.sum())
 
 
-def _inhabited(context: CheckContext, mesh: int, rows: NDArray[np.int64], piece: int) -> bool:
+class _Parts:
+    """The parts of a mesh: their faces, bounding boxes and test points, computed once for all parts."""
+
+    def __init__(self, facts: MeshFacts) -> None:
+        self.facts = facts
+        order = np.argsort(facts.piece, kind="stable")
+        self.count = np.bincount(facts.piece, minlength=facts.n_pieces)
+        self.start = np.cumsum(self.count) - self.count
+        self.face = facts.sheet[order]
+        corner = facts.corner[self.face]
+        low, high = corner.min(axis=1), corner.max(axis=1)
+        self.low = np.minimum.reduceat(low, self.start, axis=0)
+        self.high = np.maximum.reduceat(high, self.start, axis=0)
+        number = np.arange(len(order)) - np.repeat(self.start, self.count)
+        tested = number < _WITNESSES
+        self.points = SortedPoints(corner[tested, 0], facts.piece[order][tested].astype(np.int64))
+        self.hollow = facts.closed & (facts.volume > 0)
+
+    def faces(self, piece: int) -> NDArray[np.int64]:
+        """Return the faces of a part, (n,) int64, indices into `MeshFacts.good`."""
+        return self.face[self.start[piece] : self.start[piece] + self.count[piece]]
+
+
+def _inhabited(context: CheckContext, mesh: int, parts: _Parts, piece: int) -> bool:
     """Return whether a closed part contains something, or is the inner surface of a shell.
 
-    The part is number `piece` of the mesh, and `rows` are its faces as indices into `MeshFacts.good`.
+    The part is number `piece` of the mesh.
     """
-    facts = context.meshes[mesh]
-    corner = facts.corner[rows]
-    others = [np.zeros((0, 3))]
-    # Test points of the other parts of the mesh, and whether another closed part contains this one.
-    for other in range(facts.n_pieces):
-        if other != piece:
-            own = facts.sheet[facts.piece == other]
-            others.append(facts.corner[own[:_WITNESSES], 0])
-            if facts.closed[other] and facts.volume[other] > 0:
-                hollow = first_inside(facts.corner[own], corner[:_WITNESSES, 0])
-                if hollow is not None:
-                    return True
-    if first_inside(corner, np.concatenate(others)) is not None:
+    facts = parts.facts
+    corner = facts.corner[parts.faces(piece)]
+    # Test whether another closed part contains this one, and the test points of the other parts.
+    own = corner[:_WITNESSES, 0]
+    around = (
+        parts.hollow & (parts.low < own.max(axis=0)).all(axis=1) & (parts.high > own.min(axis=0)).all(axis=1)
+    )
+    for other in np.flatnonzero(around):
+        if other != piece and first_inside(facts.corner[parts.faces(int(other))], own) is not None:
+            return True
+    if first_inside(corner, parts.points.within(parts.low[piece], parts.high[piece], piece)) is not None:
         return True
     # Test lights, cameras and points of other objects, in the object space of each instance.
-    for instance in context.source.instances:
-        if instance.mesh == mesh:
-            inverse = np.linalg.pinv(instance.world_from_object)
-            points = _things(context, instance.node)
-            local = points @ inverse[:3, :3].T + inverse[:3, 3]
-            if first_inside(corner, local) is not None:
-                return True
-    return False
-
-
-def _things(context: CheckContext, node: int) -> NDArray[np.float64]:
-    """Return positions of lights and cameras, and some vertices of all objects except that of `node`.
-
-    The result is (n, 3) float64, metres, world.
-    """
-    scene = context.scene
-    points = list(light_positions(scene))
-    points += [np.array(camera.position) for camera in scene.cameras]
-    for instance in context.source.instances:
-        facts = context.meshes[instance.mesh]
-        if instance.node == node or not len(facts.good):
-            continue
-        step = max(1, len(facts.good) // _WITNESSES)
+    box = np.array(list(product(*zip(parts.low[piece], parts.high[piece], strict=True))))
+    for instance in context.instances_of.get(mesh, ()):
         matrix = instance.world_from_object
-        points += list(facts.corner[::step, 0][:_WITNESSES] @ matrix[:3, :3].T + matrix[:3, 3])
-    return np.array(points, np.float64).reshape(-1, 3)
+        world = box @ matrix[:3, :3].T + matrix[:3, 3]
+        low, high = world.min(axis=0), world.max(axis=0)
+        margin = 1e-6 * (np.abs(world).max() + (high - low).max())
+        if np.linalg.cond(matrix[:3, :3]) > _FLATTENED:
+            # Points far from a flattened object are mapped into its box, too.
+            low, high = np.full(3, -np.inf), np.full(3, np.inf)
+        points = context.test_points.within(low - margin, high + margin, instance.node)
+        inverse = np.linalg.pinv(matrix)
+        if first_inside(corner, points @ inverse[:3, :3].T + inverse[:3, 3]) is not None:
+            return True
+    return False

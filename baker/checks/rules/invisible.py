@@ -51,7 +51,7 @@ def invisible(context: CheckContext) -> Iterator[RawFinding]:
         used = [int(k) for k in np.unique(material)]
         if any(_seen(facts, k, context.scene.materials[k]) for k in used):
             continue
-        n_shown = sum(instance.mesh == m for instance in context.source.instances)
+        n_shown = len(context.instances_of.get(m, ()))
         if n_shown:
             yield RawFinding(
                 _sentence([context.scene.materials[k] for k in used]), context.location(m), n_shown

@@ -194,7 +194,7 @@ def albedo(context: CheckContext) -> Iterator[RawFinding]:
     for k in context.used_materials:
         material, value = context.scene.materials[k], float(reflected[k])
         if value > MOST_REFLECTED:
-            mesh = next(m for m, f in enumerate(context.meshes) if (f.material[f.good] == k).any())
+            mesh = context.mesh_with[k]
             what = f"material '{material.name}'" if material.name else "the default material"
             text = f"{what} has an albedo of {value:.3g}"
             if value > NEARLY_WHITE:
@@ -213,9 +213,10 @@ def albedos(context: CheckContext) -> NDArray[np.float64]:
     and the material has a base colour texture, it is multiplied by the mean texture colour.
     """
     out = np.zeros(len(context.scene.materials))
+    brightest = _brightest_vertex_colours(context)
     for k in context.used_materials:
         material = context.scene.materials[k]
-        painted = _painted(context, k)
+        painted = brightest.get(k, 1.0)
         out[k] = max(material.base_colour[:3]) * painted
         if material.base_colour_texture is not None and out[k] > MOST_REFLECTED:
             mean = image_mean(material.base_colour_texture.image)
@@ -223,19 +224,23 @@ def albedos(context: CheckContext) -> NDArray[np.float64]:
     return out
 
 
-def _painted(context: CheckContext, material: int) -> float:
-    """Return the largest vertex colour component on surfaces of a material.
+def _brightest_vertex_colours(context: CheckContext) -> dict[int, float]:
+    """Return the largest vertex colour component on surfaces of each material, by material index.
 
-    It is 1 if a primitive with this material has no vertex colours.
+    It is 1 for a material with a primitive without vertex colours.
     """
-    brightest = []
+    brightest: dict[int, float] = {}
+    plain: set[int] = set()
     for facts in context.meshes:
-        for k, p in enumerate(facts.source.primitives):
-            if p.material == material and (facts.primitive[facts.good] == k).any():
-                if p.colour is None:
-                    return 1.0
-                brightest.append(float(np.nan_to_num(p.colour[:, :3], nan=1.0).max(initial=0.0)))
-    return max(brightest, default=1.0)
+        for k in np.unique(facts.primitive[facts.good]).tolist():
+            primitive = facts.source.primitives[k]
+            material = primitive.material
+            if primitive.colour is None:
+                plain.add(material)
+            elif material not in plain:
+                value = float(np.nan_to_num(primitive.colour[:, :3], nan=1.0).max(initial=0.0))
+                brightest[material] = max(brightest.get(material, 0.0), value)
+    return {**brightest, **dict.fromkeys(plain, 1.0)}
 
 
 def image_mean(image: NDArray[np.generic]) -> NDArray[np.float64]:

@@ -117,7 +117,10 @@ class Packer:
         """
         size = rows.shape[1]
         # Align elements to four bytes (glTF 2.0, section 3.6.2.4).
-        padded = np.pad(rows, ((0, 0), (0, -size % 4)))
+        padded = rows
+        if size % 4:
+            padded = np.zeros((len(rows), size + -size % 4), np.uint8)
+            padded[:, :size] = rows
         keep = {key: value for key, value in like.items() if key not in _OWN_KEYS}
         accessor: Json = {**copy.deepcopy(keep), "count": len(rows)}
         if (bounds or "min" in like) and not like["type"].startswith("MAT"):

@@ -108,7 +108,7 @@ def _valid_triangles(
         keep(usable[triangle].all(axis=1), "bad-vertices", "with NaN, infinite or huge coordinates")
     keep(~zero_area(position, triangle), "zero-area", "without area")
     material = np.array([p.material for p in primitives], np.int32)[owner]
-    double_sided = np.array([m.double_sided for m in materials], bool)
+    double_sided = np.array([materials[p.material].double_sided for p in primitives], bool)[owner]
     keep(
         ~duplicates(position, triangle, material, double_sided), "duplicate-faces", "that repeat another face"
     )

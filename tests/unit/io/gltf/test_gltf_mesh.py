@@ -152,7 +152,7 @@ def test_duplicates_agree_with_the_slow_twin(seed):
     triangle = triangle[~zero_area(grid, triangle)]
     material = rng.integers(0, 2, len(triangle)).astype(np.int32)
     double_sided = np.array([False, True])
-    got = duplicates(grid, triangle, material, double_sided)
+    got = duplicates(grid, triangle, material, double_sided[material])
     assert got.any()
     assert not got.all()
     assert got.tolist() == slow_duplicates(grid, triangle, material, double_sided)
