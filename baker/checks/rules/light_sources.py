@@ -230,17 +230,17 @@ def _brightest_vertex_colours(context: CheckContext) -> dict[int, float]:
     It is 1 for a material with a primitive without vertex colours.
     """
     brightest: dict[int, float] = {}
-    plain: set[int] = set()
+    uncoloured: set[int] = set()
     for facts in context.meshes:
         for k in np.unique(facts.primitive[facts.good]).tolist():
             primitive = facts.source.primitives[k]
             material = primitive.material
             if primitive.colour is None:
-                plain.add(material)
-            elif material not in plain:
+                uncoloured.add(material)
+            elif material not in uncoloured:
                 value = float(np.nan_to_num(primitive.colour[:, :3], nan=1.0).max(initial=0.0))
                 brightest[material] = max(brightest.get(material, 0.0), value)
-    return {**brightest, **dict.fromkeys(plain, 1.0)}
+    return {**brightest, **dict.fromkeys(uncoloured, 1.0)}
 
 
 def image_mean(image: NDArray[np.generic]) -> NDArray[np.float64]:
