@@ -8,7 +8,7 @@ import sys
 
 
 def start_module(module: str) -> subprocess.Popen[bytes]:
-    """Start `python -m module` with pipes at its standard input and output.
+    """Start `python -m module ID` with pipes at its standard input and output; ID is the id of this process.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def start_module(module: str) -> subprocess.Popen[bytes]:
     """
     path = os.pathsep.join(entry for entry in sys.path if entry)
     return subprocess.Popen(
-        [sys.executable, "-m", module],
+        [sys.executable, "-m", module, str(os.getpid())],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,

@@ -22,8 +22,8 @@ def end_with_parent(parent: int) -> None:
     Parameters
     ----------
     parent : int
-        Id of the parent process, read as early as possible. If the parent has changed since, this process
-        exits immediately.
+        Id of the parent process, from the parent itself or read as early as possible. If the parent has
+        changed since, this process exits immediately.
     """
     if sys.platform == "linux":
         import ctypes

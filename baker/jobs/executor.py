@@ -8,10 +8,11 @@ import os
 import queue
 import subprocess
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from baker.core.child_process import start_module
+from baker.core.stage import Stage
 from baker.io.bake.recovery import recover
 from baker.jobs.jobs_file import Job
 
@@ -60,8 +61,21 @@ class JobExecutor(Protocol):
         """Stop all jobs immediately; the output folders of unfinished jobs keep their old content."""
 
 
+@dataclass(frozen=True)
+class _Work:
+    """A job and the arguments that it was started with; `again` if a worker has died at it before."""
+
+    ticket: int
+    job: Job
+    threads: int
+    force: bool
+    again: bool = False
+
+
 class LocalJobExecutor:
     """Bakes in worker processes; each process bakes one job after another.
+
+    If a process dies, a new process repeats its job. If that process dies, too, the job has failed.
 
     Parameters
     ----------
@@ -73,13 +87,16 @@ class LocalJobExecutor:
         self.slots = slots
         self._heard: queue.SimpleQueue[tuple[_Worker, dict[str, Any]]] = queue.SimpleQueue()
         self._idle: list[_Worker] = []
-        self._busy: dict[_Worker, tuple[int, Job]] = {}
+        self._busy: dict[_Worker, _Work] = {}
 
     def start(self, ticket: int, job: Job, *, threads: int, force: bool) -> None:
         """Send a job to an idle worker, or to a new worker if none is idle."""
         worker = self._idle.pop() if self._idle else _Worker(self._heard)
-        self._busy[worker] = (ticket, job)
-        worker.begin(job, threads=threads, force=force)
+        self._begin(worker, _Work(ticket, job, threads, force))
+
+    def _begin(self, worker: _Worker, work: _Work) -> None:
+        self._busy[worker] = work
+        worker.begin(work.job, threads=work.threads, force=work.force)
 
     def next_event(self, timeout: float) -> Event | None:
         """Return the next event of any busy worker.
@@ -94,22 +111,34 @@ class LocalJobExecutor:
             # The worker died between two jobs.
             self._idle = [other for other in self._idle if other is not worker]
             return None
-        ticket, job = self._busy[worker]
+        work = self._busy[worker]
         if "stage" in message:
-            return Event(ticket, message["stage"], message["fraction"])
+            return Event(work.ticket, message["stage"], message["fraction"])
         del self._busy[worker]
-        if message.get("dead"):
-            worker.end(job)
-        else:
+        if "died" not in message:
             self._idle.append(worker)
-        return Event(ticket, ended=True, error=message.get("error"))
+            return Event(work.ticket, ended=True, error=message.get("error"))
+        worker.end(work.job)
+        if work.again:
+            return Event(work.ticket, ended=True, error=_death(message["died"]))
+        return self._repeat(work)
+
+    def _repeat(self, work: _Work) -> Event:
+        """Give a job at which a worker has died to a new worker, because an idle one may be dead, too."""
+        try:
+            worker = _Worker(self._heard)
+        except OSError as error:
+            why = f"its process died, and no new process could be started ({error.strerror})"
+            return Event(work.ticket, ended=True, error=_lost(why))
+        self._begin(worker, replace(work, again=True))
+        return Event(work.ticket, Stage.START)
 
     def close(self) -> None:
         """Kill all workers. Undo their incomplete writes to output folders, and delete temporary folders."""
         for worker in self._idle:
             worker.end(None)
-        for worker, (_, job) in self._busy.items():
-            worker.end(job)
+        for worker, work in self._busy.items():
+            worker.end(work.job)
         self._busy.clear()
         self._idle.clear()
 
@@ -136,7 +165,7 @@ class _Worker:
         assert self.process.stdout is not None
         for line in self.process.stdout:
             self.heard.put((self, json.loads(line)))
-        self.heard.put((self, {"dead": True, "error": _death(self.process.wait())}))
+        self.heard.put((self, {"died": self.process.wait()}))
 
     def end(self, job: Job | None) -> None:
         """Kill the process. Undo an incomplete write to the output folder of its current job, `job`.
@@ -158,8 +187,10 @@ def _death(status: int) -> dict[str, Any]:
     # Status -9 is SIGKILL, sent by a user or by the operating system if memory runs out. Other negative
     # numbers are signals, mostly crashes of native code. Positive numbers are exit codes.
     if status == -9:
-        why = "its process was killed from outside, most likely for want of memory"
-    else:
-        why = f"its process died (status {status})"
+        return _lost("its process was killed twice, most likely for lack of memory")
+    return _lost(f"its process died twice (status {status})")
+
+
+def _lost(why: str) -> dict[str, Any]:
     hint = "try a smaller resolution or fewer jobs at a time"
     return {"kind": "resource", "message": f"{why}; {hint}", "file": None, "object": None, "code": 4}

@@ -31,7 +31,7 @@ def main() -> None:
     """Bake jobs until stdin ends."""
     # Ignore Ctrl-C, which the whole process group receives; the parent stops this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    end_with_parent(os.getppid())
+    end_with_parent(int(sys.argv[1]))
     # Native libraries may print to stdout: redirect descriptor 1 to stderr, and keep a copy for the messages.
     sink = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)

@@ -7,7 +7,6 @@ followed by an npz file of that length.
 from __future__ import annotations
 
 import io
-import os
 import signal
 import sys
 from typing import IO, Any
@@ -63,7 +62,7 @@ def main() -> None:
     """Process jobs until stdin ends."""
     # Ignore Ctrl-C, which signals the whole process group. The parent process kills this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    end_with_parent(os.getppid())
+    end_with_parent(int(sys.argv[1]))
     source, sink = sys.stdin.buffer, sys.stdout.buffer
     while (message := read_message(source)) is not None:
         charts = cut_charts(ChartJob(**message))
