@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, TextIO
 import typer
 
 from baker.cli.command import Cluster, Run, command
+from baker.cli.flags import in_flags
 from baker.jobs.settings import BatchSettings
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ def batch(
             starting=lambda out: run.session.will_write(str(out)),
         )
     if junit is not None:
-        write_junit(junit, report.outcomes)
+        write_junit(junit, report.outcomes, in_flags)
     if not run.quiet:
         write_table(report.outcomes, run.text, dry_run=settings.dry_run)
     if run.as_json:

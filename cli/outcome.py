@@ -39,22 +39,24 @@ def write_worst(worst: Sequence[dict[str, Any]], stream: TextIO) -> None:
         )
 
 
-def write_limits(verdicts: Iterable[Verdict], stream: TextIO) -> None:
+def write_limits(verdicts: Iterable[Verdict], stream: TextIO, *, default: bool) -> None:
     """Write the limits that were applied, each with the value of its metric."""
     by_channel: dict[str, list[str]] = {}
     for verdict in verdicts:
         limit = verdict.limit
-        value = "none" if verdict.value is None else f"{verdict.value:.3g}"
-        entry = f"{limit.metric} {value} ({limit.operator} {limit.number:g})"
+        entry = f"{limit.metric} {verdict.readable} ({limit.readable})"
         by_channel.setdefault(limit.channel, []).append(entry)
+    which = "default limits" if default else "limits of --fail-if"
     for channel, words in by_channel.items():
-        text = f"limits of {channel}, which fail beyond what is in brackets: {', '.join(words)}"
-        stream.write(textwrap.fill(text, 100, subsequent_indent="  ", break_on_hyphens=False) + "\n")
+        # Do not break a line inside an entry.
+        entries = ", ".join(words).replace(" ", "\0").replace(",\0", ", ")
+        text = f"{which} on {channel}, with what fails in brackets: {entries}"
+        lines = textwrap.fill(text, 100, subsequent_indent="  ", break_on_hyphens=False)
+        stream.write(lines.replace("\0", " ") + "\n")
 
 
 def write_failed(verdicts: Iterable[Verdict], stream: TextIO) -> None:
     """Write the limits that were exceeded."""
     for verdict in verdicts:
         if verdict.failed:
-            value = "no such figure" if verdict.value is None else f"it is {verdict.value:.4g}"
-            stream.write(f"failed: {verdict.limit} ({value})\n")
+            stream.write(f"failed: {verdict.sentence()}\n")

@@ -8,8 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 import typer
 
 from baker.cli.command import Run, command
+from baker.cli.flags import in_flags
 from baker.cli.outcome import report_outcome, write_failed, write_limits, write_worst
+from baker.metrics.figures import FIGURES, figure_text
 from baker.verification.settings import VerifySettings
+
+# Metrics in the columns of the table.
+_COLUMNS = (
+    "texels", "bias", "colour_bias", "median", "colour_median", "p95", "nrmse", "noise_floor", "z_rms",
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from baker.verification.verify import VerifyReport
@@ -33,24 +40,22 @@ def verify(
         if report is not None:
             from baker.verification.report import write_report
 
-            write_report(report, found)
+            write_report(report, found, in_flags)
         if junit is not None:
             from baker.verification.junit import write_junit
 
-            write_junit(junit, found)
+            write_junit(junit, found, in_flags)
     report_outcome(found, run, write_text)
 
 
 def write_text(found: VerifyReport, stream: TextIO, *, verbose: int) -> None:
-    """Write a table of metrics, the worst regions and texels, the limits, and those that failed."""
+    """Write a table of metrics, the worst regions and texels, the limits, and whether the bake is good."""
     for warning in found.warnings:
         stream.write(f"warning: {warning.message}\n")
-    columns = (
-        "texels", "bias", "colour_bias", "median", "colour_median", "p95", "nrmse", "noise_floor", "z_rms"
-    )  # fmt: skip
-    stream.write(f"{'':12}" + "".join(f"{name:>14}" for name in columns) + "\n")
+    stream.write(f"{'':12}" + "".join(f"{name:>14}" for name in _COLUMNS) + "\n")
     for name, check in found.channels.items():
-        stream.write(f"{name:12}" + "".join(f"{_words(check.metrics[c], c):>14}" for c in columns) + "\n")
+        cells = "".join(f"{figure_text(column, check.metrics[column]):>14}" for column in _COLUMNS)
+        stream.write(f"{name:12}{cells}\n")
         ratio, error = check.metrics["energy_ratio"], check.metrics["energy_ratio_se"]
         if ratio is not None:
             give = "" if error is None else f" +- {error:.4f}"
@@ -58,18 +63,20 @@ def write_text(found: VerifyReport, stream: TextIO, *, verbose: int) -> None:
         if check.unresolved:
             share = check.unresolved / max(len(check.value), 1)
             stream.write(f"  {share:.0%} of its texels stayed noisier than asked for; see noise_floor\n")
+    if verbose:
+        for column in _COLUMNS:
+            stream.write(f"  {column}: {FIGURES[column].phrase}\n")
     _write_regions(found.regions[: None if verbose else 3], stream)
     write_worst(found.worst[: None if verbose else 3], stream)
-    write_limits(found.verdicts, stream)
+    write_limits(found.verdicts, stream, default=found.settings.fail_if is None)
     write_failed(found.verdicts, stream)
     for problem in found.problems:
         stream.write(f"failed: {problem}\n")
-    failed = sum(verdict.failed for verdict in found.verdicts)
-    how = f"{failed} of {len(found.verdicts)} limits" if failed else f"{len(found.verdicts)} limits hold"
-    single = "" if any(v.limit.metric == "max" for v in found.verdicts) else "; single texels have no limit"
     compiling = f" and {found.compile_seconds:.0f} s of compiling" if found.compile_seconds >= 1 else ""
-    verdict = "FAILED" if failed else "passed"
-    stream.write(f"{verdict}: {how}{'' if failed else single} ({found.seconds:.0f} s{compiling})\n")
+    single = "" if any(v.limit.metric == "max" for v in found.verdicts) else "single texels have no limit; "
+    more = "" if verbose else "-v explains the figures; "
+    stream.write(f"{'passed' if found.passed else 'FAILED'}: {found.verdict}\n")
+    stream.write(f"({single}{more}{found.seconds:.0f} s{compiling})\n")
 
 
 def _write_regions(regions: list[dict[str, Any]], stream: TextIO) -> None:
@@ -79,13 +86,3 @@ def _write_regions(regions: list[dict[str, Any]], stream: TextIO) -> None:
                 f"region: {row['channel']} of {row['region']} ({row['texels']} texels, {row['area']:.3g} m2):"
                 f" {row['bias']:+.1%} +- {row['bias_se']:.1%}, typically {row['typical']:.1%} off\n"
             )
-
-
-def _words(value: Any, name: str) -> str:
-    if value is None:
-        return "-"
-    if name in ("texels",):
-        return str(value)
-    if name == "z_rms":
-        return f"{value:.2f}"
-    return f"{value:+.2%}" if name.endswith("bias") else f"{value:.2%}"

@@ -370,6 +370,11 @@ def test_settings_page_is_current():
     assert (ROOT / "docs" / "SETTINGS.md").read_text("utf-8") == page
 
 
+def test_table_of_figures_is_current():
+    page = run(sys.executable, str(ROOT / "docs" / "make_figures_table.py"), "--print")
+    assert (ROOT / "docs" / "ACCURACY.md").read_text("utf-8") == page
+
+
 def test_code_map_is_current():
     page = run(sys.executable, str(ROOT / "docs" / "make_code_map.py"), "--print")
     assert (ROOT / "docs" / "ARCHITECTURE.md").read_text("utf-8") == page

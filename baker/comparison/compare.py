@@ -166,7 +166,7 @@ def compare(
     names = [n for n in first.maps if n in second.maps and first.maps[n].shape[3] == second.maps[n].shape[3]]
     if not names:
         raise InputError("the bakes have no channel in common", file=str(b))
-    limits = parse_limits(settings.fail_if, names, LIMITED) if settings.fail_if else []
+    limits = [] if settings.fail_if is None else parse_limits(settings.fail_if, names, LIMITED)
     if not settings.flip and any(limit.metric == "flip" for limit in limits):
         raise SettingsError("`fail_if` limits flip, which `flip=False` leaves out", object="fail_if")
     for bake in (first, second):

@@ -310,7 +310,7 @@ def batch_json(outcomes: Sequence[Outcome], *, dry_run: bool) -> dict[str, Any]:
     return {"jobs": rows, "dry_run": dry_run}
 
 
-def write_junit(path: Path, outcomes: Sequence[Outcome]) -> None:
+def write_junit(path: Path, outcomes: Sequence[Outcome], in_words: Callable[[str], str] = str) -> None:
     """Write one JUnit case for each job.
 
     Parameters
@@ -319,6 +319,8 @@ def write_junit(path: Path, outcomes: Sequence[Outcome]) -> None:
         File to write.
     outcomes : sequence of Outcome
         Outcomes in the order of the jobs.
+    in_words : callable
+        Converts messages that name settings in backticks, for example to flags of the command line.
 
     Raises
     ------
@@ -331,7 +333,7 @@ def write_junit(path: Path, outcomes: Sequence[Outcome]) -> None:
         Case(
             str(outcome.job.scene),
             str(outcome.job.out or "batch"),
-            outcome.why if outcome.state == "failed" else "",
+            in_words(outcome.why) if outcome.state == "failed" else "",
             outcome.seconds,
             error=outcome.code == ResourceError.exit_code,
         )

@@ -14,6 +14,7 @@ from typing import Any
 
 from baker.core.errors import SettingsError
 from baker.core.names import unknown_name
+from baker.metrics.figures import FIGURES, figure_text, limit_text
 
 _OPERATORS: dict[str, Callable[[float, float], bool]] = {
     ">=": operator.ge, "<=": operator.le, ">": operator.gt, "<": operator.lt,
@@ -50,6 +51,11 @@ class Limit:
         """Return the limit as `--fail-if` takes it."""
         return f"{self.channel}.{self.metric} {self.operator} {self.number:g}"
 
+    @property
+    def readable(self) -> str:
+        """Return the operator and the number as people read them, such as "> 1.5%"."""
+        return limit_text(self.metric, self.operator, self.number)
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -66,6 +72,18 @@ class Verdict:
     limit: Limit
     value: float | None
     failed: bool
+
+    @property
+    def readable(self) -> str:
+        """Return the value as people read it, such as "2.3%"; "missing" if it could not be computed."""
+        return "missing" if self.value is None else figure_text(self.limit.metric, self.value)
+
+    def sentence(self) -> str:
+        """Return the limit, the value, and what the metric means."""
+        known = FIGURES.get(self.limit.metric)
+        phrase = f" ({known.phrase})" if known else ""
+        value = "could not be computed" if self.value is None else f"is {self.readable}"
+        return f"{self.limit}: {self.limit.metric} {value}{phrase}"
 
 
 def parse_limits(text: str, channels: Iterable[str], metrics: Iterable[str]) -> list[Limit]:
@@ -90,6 +108,11 @@ def parse_limits(text: str, channels: Iterable[str], metrics: Iterable[str]) -> 
     SettingsError
         If the expression is malformed or contains an unknown name.
     """
+    if not text.strip():
+        raise SettingsError(
+            "it is empty; give limits such as 'irradiance.p95 > 0.05', or leave it out",
+            object="fail_if",
+        )
     limits = []
     channels, metrics = list(channels), list(metrics)
     for part in text.split(","):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from baker.io.junit import Case, junit_text, write_text
 from baker.verification.verify import VerifyReport
 
 
-def write_junit(path: Path, found: VerifyReport) -> None:
+def write_junit(path: Path, found: VerifyReport, in_words: Callable[[str], str] = str) -> None:
     """Write the JUnit file.
 
     Parameters
@@ -17,6 +18,8 @@ def write_junit(path: Path, found: VerifyReport) -> None:
         File to write.
     found : VerifyReport
         Result of `verify`.
+    in_words : callable
+        Converts messages that name settings in backticks, for example to flags of the command line.
 
     Raises
     ------
@@ -26,11 +29,10 @@ def write_junit(path: Path, found: VerifyReport) -> None:
     scene = found.bake.folder.name
     cases = []
     for verdict in found.verdicts:
-        value = "missing" if verdict.value is None else f"{verdict.value:.6g}"
         problem = ""
         if verdict.failed:
             remark = found.channels[verdict.limit.channel].remarks.get(verdict.limit.metric)
-            problem = f"{verdict.limit}: it is {value}" + (f"; {remark}" if remark else "")
+            problem = in_words(verdict.sentence() + (f"; {remark}" if remark else ""))
         cases.append(Case(f"not {verdict.limit}", scene, problem))
     if cases:
         cases[0] = Case(cases[0].name, cases[0].group, cases[0].problem, found.seconds)

@@ -47,6 +47,7 @@ from baker.verification.tracing import (
     trace_irradiance,
 )
 from baker.verification.unverified_area import UnverifiedArea, measure_unverified_area
+from baker.verification.verdict import verdict_sentence
 
 CHANNELS = ("irradiance", "ao")
 # Time for path-tracing crops, as a share of the time limit. It is added to the time limit.
@@ -100,6 +101,8 @@ class VerifyReport(Result):
     ----------
     bake : StoredBake
         The verified bake.
+    settings : VerifySettings
+        The settings of the verification.
     pixel : (n,) int64
         Compared random texels, (page * H + row) * W + column.
     owner : (n,) int32
@@ -128,6 +131,7 @@ class VerifyReport(Result):
     """
 
     bake: StoredBake
+    settings: VerifySettings
     pixel: NDArray[np.int64]
     owner: NDArray[np.int32]
     position: NDArray[np.float64]
@@ -150,6 +154,12 @@ class VerifyReport(Result):
         """Return whether no limit failed."""
         return not any(verdict.failed for verdict in self.verdicts)
 
+    @property
+    def verdict(self) -> str:
+        """Return one sentence: whether the bake is good, by which limits, and how large its error is."""
+        metrics = {name: check.metrics for name, check in self.channels.items()}
+        return verdict_sentence(self.verdicts, metrics, default=self.settings.fail_if is None)
+
     def flip(self, channel: str) -> float | None:
         """Return the mean FLIP error of a channel's crops, None if there are no crops."""
         values = [crop.flip for crop in self.crops if crop.channel == channel]
@@ -171,6 +181,8 @@ class VerifyReport(Result):
         """Return the report as JSON-serialisable values; `baker verify --json` prints them."""
         return {
             "passed": self.passed,
+            "verdict": self.verdict,
+            "limits_from": "default" if self.settings.fail_if is None else "fail_if",
             "channels": {
                 name: {
                     **check.metrics,
@@ -248,12 +260,14 @@ def verify(
     names = [name for name in CHANNELS if name in bake.maps]
     if not names:
         raise InputError("the bake holds no channel that can be verified (irradiance, ao)", file=str(out))
-    limits = parse_limits(settings.fail_if or default_limits(names), names, METRIC_NAMES)
+    expression = default_limits(names) if settings.fail_if is None else settings.fail_if
+    limits = parse_limits(expression, names, METRIC_NAMES)
     found = _compare(bake, names, settings, progress)
     metrics = {name: check.metrics for name, check in found.channels.items()}
     verdicts = evaluate_limits(limits, metrics, missing_fails=settings.fail_if is not None)
     return VerifyReport(
         bake=bake,
+        settings=settings,
         pixel=found.pixel,
         owner=found.owner,
         position=found.position,

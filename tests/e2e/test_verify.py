@@ -167,6 +167,7 @@ def test_limits_decide_the_exit_code(sound):
     [
         (["--fail-if", "irradiance.p59 > 1"], 2, "there is no figure 'p59'; did you mean"),
         (["--fail-if", "nonsense"], 2, "not of the form"),
+        (["--fail-if", ""], 2, "it is empty"),
         (["--texels", "0"], 2, "--texels"),
         (["--spp", "0"], 2, "--spp"),
         (["--time-limit", "-1"], 2, "--time-limit"),
@@ -194,6 +195,16 @@ def test_reports(sound, tmp_path):
     assert text.count("data:image/png;base64,") >= 4 + 9
     assert "http" not in text.replace("http-equiv", "")
     assert "energy_ratio_se" in text
+    assert "<h1>Verification of " in text
+    assert "The bake is good: irradiance is " in text
+    assert "The bake is good: irradiance is " in stream.getvalue()
+    # Date, versions and settings, the explanation of each figure, and a plot of the light levels.
+    assert " UTC, baker " in text
+    assert "--resolution 128" in text
+    assert "--texels 400" in text
+    assert "mean error relative to the mean light" in text
+    assert 'aria-label="error against light level"' in text
+    assert "default limits on irradiance" in stream.getvalue()
     # Tables have at most 8 columns, so that they fit a page of 1200 pixels.
     assert max(row.count("<th>") for row in text.split("<tr>")) <= 8
     suite = ElementTree.parse(junit).getroot()[0]

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from collections import deque
+from dataclasses import replace
 
 import pytest
 from gltf_builder import quad_builder, write
 
+from baker.cli.flags import in_flags
 from baker.core.errors import Cancelled
 from baker.core.progress import silent
 from baker.core.settings import BakeSettings
@@ -166,3 +168,11 @@ def test_json_and_junit_say_the_same(jobs, tmp_path):
     root = ElementTree.parse(tmp_path / "j.xml").getroot()
     assert (root.get("tests"), root.get("failures"), root.get("errors")) == ("2", "1", "0")
     assert root.find(".//failure").get("message") == "x: it is broken"
+
+
+def test_junit_of_a_batch_names_flags(jobs, tmp_path):
+    found = run_batch(jobs[:1], FakeExecutor(1), BatchOptions(), silent)
+    failed = replace(found[0], state="failed", why="too large: lower `resolution`", code=3)
+    write_junit(tmp_path / "j.xml", [failed], in_flags)
+    root = ElementTree.parse(tmp_path / "j.xml").getroot()
+    assert root.find(".//failure").get("message") == "too large: lower --resolution"

@@ -45,7 +45,7 @@ def test_a_figure_that_is_missing_fails():
         ("irradiance.p95 = 1", "not of the form"),
         ("irradiance.p95 > x", "'x' is not a number"),
         ("irradiance.p95 > nan", "never reached"),
-        ("", "not of the form"),
+        ("", "it is empty"),
         ("irradiance.p95 > 1,", "not of the form"),
     ],
 )

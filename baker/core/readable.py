@@ -1,0 +1,61 @@
+"""Numbers as people read them: percentages and values with three significant digits, without exponents."""
+
+from __future__ import annotations
+
+import math
+
+# Number of significant digits, and the largest number of decimals.
+_DIGITS, _DECIMALS = 3, 6
+# Values at or above this magnitude are written with an exponent.
+_LARGEST = 1e15
+
+
+def number(value: float, *, signed: bool = False) -> str:
+    """Return a number with three significant digits.
+
+    Parameters
+    ----------
+    value : float
+        The number.
+    signed : bool
+        Whether positive numbers get a plus sign.
+
+    Returns
+    -------
+    str
+        "0.0152", "12.3", "1230" or "65500". Trailing zeros of the decimals are left out, and digits of an
+        integer part are zeros after the third.
+    """
+    if not math.isfinite(value):
+        return f"{value:+}" if signed else f"{value}"
+    if value == 0:
+        return "0"
+    sign = "+" if signed else ""
+    # Round first, because 99.96 has another number of decimals than 100.
+    rounded = float(f"{value:.{_DIGITS - 1}e}")
+    if abs(rounded) >= _LARGEST:
+        return f"{rounded:{sign}.{_DIGITS}g}"
+    places = _DIGITS - 1 - math.floor(math.log10(abs(rounded)))
+    if places > _DECIMALS:
+        return f"{rounded:{sign}.1e}"
+    text = f"{rounded:{sign}.{max(places, 0)}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def percent(share: float, *, signed: bool = False) -> str:
+    """Return a share as a percentage with three significant digits.
+
+    Parameters
+    ----------
+    share : float
+        The share: 1 is 100 %.
+    signed : bool
+        Whether positive shares get a plus sign.
+
+    Returns
+    -------
+    str
+        "1.52%" for 0.0152. Shares below a ten-thousandth of a percent are "0%".
+    """
+    value = 100.0 * share
+    return f"{number(0.0 if abs(value) < 1e-4 else value, signed=signed)}%"

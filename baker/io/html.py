@@ -1,0 +1,12 @@
+"""Text of files in HTML pages."""
+
+from __future__ import annotations
+
+import html
+
+from baker.core.printable import printable
+
+
+def escaped(text: str) -> str:
+    """Return a text for HTML: markup is escaped, and control characters are made printable."""
+    return html.escape(printable(text))
