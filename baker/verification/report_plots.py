@@ -36,8 +36,8 @@ def level_plot(rows: list[dict[str, Any]]) -> str:
     light = [math.log10(row["light"]) for row in rows]
     left, right = light[0], max(light[-1], light[0] + 1e-3)
     tops = [max(row["typical"], row["typical_noise"], row["bias"] + row["bias_se"]) for row in rows]
-    high = max(0.01, 1.1 * max(tops))
-    low = min(0.0, 1.1 * min(row["bias"] - row["bias_se"] for row in rows))
+    high = max(0.01, 1.1 * float(max(tops)))
+    low = min(0.0, 1.1 * float(min(row["bias"] - row["bias_se"] for row in rows)))
 
     def x(value: float) -> float:
         return _LEFT + (value - left) / (right - left) * (_WIDTH - _LEFT - _RIGHT)
