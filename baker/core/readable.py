@@ -35,10 +35,10 @@ def number(value: float, *, signed: bool = False) -> str:
     rounded = float(f"{value:.{_DIGITS - 1}e}")
     if abs(rounded) >= _LARGEST:
         return f"{rounded:{sign}.{_DIGITS}g}"
-    places = _DIGITS - 1 - math.floor(math.log10(abs(rounded)))
-    if places > _DECIMALS:
+    decimals = _DIGITS - 1 - math.floor(math.log10(abs(rounded)))
+    if decimals > _DECIMALS:
         return f"{rounded:{sign}.1e}"
-    text = f"{rounded:{sign}.{max(places, 0)}f}"
+    text = f"{rounded:{sign}.{max(decimals, 0)}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
