@@ -152,6 +152,7 @@ def quad_result(folder: Path, **settings: object) -> BakeResult:
         texel_count=np.array([123]),
         timings={"trace": 0.5, "write": 0.1},
         rays={"gather": 1000},
+        suggested_exposure=0.0625,
         solve={
             "patches": 4, "nonzeros": 9, "iterations": 3, "residual": 1e-7,
             "energy": {"emitted": np.ones(3), "absorbed": np.full(3, 0.75), "escaped": np.full(3, 0.25)},

@@ -132,6 +132,9 @@ class BakeResult(Result):
     texel_count : (I,) int64
         Number of texels of each instance, in the order of `scene.instances`.
     statistics : dict of channel to {min, max, mean, clipped, invalid}
+    suggested_exposure : float or None
+        Factor on albedo x E / pi for a display: 90 % of the lit texels are then at most 0.5, 1 = white. It is
+        1 for a black bake, and None without the channel irradiance.
     timings : dict of stage to seconds
     rays : dict of stage to number of rays
     solve : dict
@@ -152,6 +155,7 @@ class BakeResult(Result):
     status: NDArray[np.uint8]
     texel_count: NDArray[np.int64]
     statistics: dict[str, dict[str, Any]] = field(default_factory=dict)
+    suggested_exposure: float | None = None
     timings: dict[str, float] = field(default_factory=dict)
     rays: dict[str, int] = field(default_factory=dict)
     solve: dict[str, Any] = field(default_factory=dict)

@@ -18,15 +18,15 @@ class BabylonExport:
         place_bake(bake, target)
         write_text(target / "lightmap.js", template("babylon", "lightmap.js"))
         write_readme(
+            bake,
             target,
             "Lightmaps for Babylon.js",
             steps=(
                 "Serve this folder, and load it with lightmap.js (Babylon.js 7 or newer, glTF loader):",
                 "`import { loadBake } from './babylon/lightmap.js';`",
                 "`await loadBake(BABYLON, 'babylon/', scene);`",
-                "The lights of the file are switched off, because the pages contain their light. For ZIP",
-                "pages, Babylon.js fetches fflate from a CDN; `{ fflate: URL }` names your copy of its",
-                "umd/index.js.",
+                "The lights of the file are switched off, because the pages contain their light.",
+                "For ZIP pages, Babylon.js fetches fflate from a CDN; `{ fflate: URL }` names your copy.",
             ),
             scale="The pages contain irradiance E in lx; materials show albedo x E / pi in cd/m2. "
             "The option `{ exposure: x }` multiplies all light by x.",

@@ -29,6 +29,7 @@ class BevyExport:
         source = source.replace("    /* pages */\n", pages).replace("    /* objects */\n", rows)
         write_text(target / "baker_lightmaps.rs", source)
         write_readme(
+            bake,
             target,
             "Lightmaps for Bevy",
             steps=(

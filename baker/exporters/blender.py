@@ -18,6 +18,7 @@ class BlenderExport:
         place_named_bake(bake, target)
         write_text(target / "import_lightmaps.py", template("blender", "import_lightmaps.py"))
         write_readme(
+            bake,
             target,
             "Lightmaps for Blender",
             steps=(

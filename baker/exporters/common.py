@@ -14,6 +14,8 @@ from typing import Any
 MANIFEST_NAME = "bake.json"
 SCENE_NAME = "scene.glb"
 DESCRIPTION_NAME = "lightmap.json"
+# Key of the manifest and of `lightmap.json`.
+EXPOSURE_KEY = "suggested_exposure"
 
 
 def read_manifest(bake: Path) -> dict[str, Any]:
@@ -29,7 +31,7 @@ def irradiance_pages(manifest: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def describe(manifest: dict[str, Any]) -> dict[str, Any]:
-    """Return the content of `lightmap.json`: the pages, and the page and uv transform of each object.
+    """Return the content of `lightmap.json`: pages, suggested exposure, page and uv transform of each object.
 
     The uv in a page is `TEXCOORD_1 * uv_scale + uv_offset`; v = 0 is the first image row.
     """
@@ -38,6 +40,7 @@ def describe(manifest: dict[str, Any]) -> dict[str, Any]:
         "scene": SCENE_NAME,
         "quantity": "irradiance",
         "unit": "lx",
+        EXPOSURE_KEY: manifest.get(EXPOSURE_KEY),
         "pages": [
             {"file": page["file"], "width": page["width"], "height": page["height"]}
             for page in irradiance_pages(manifest)
@@ -83,11 +86,17 @@ def template(export: str, name: str) -> str:
     return resources.files("baker.exporters").joinpath("templates", export, name).read_text("utf-8")
 
 
-def write_readme(target: Path, title: str, *, scale: str, uv: str, rows: str, steps: tuple[str, ...]) -> None:
+def write_readme(
+    bake: Path, target: Path, title: str, *, scale: str, uv: str, rows: str, steps: tuple[str, ...]
+) -> None:
     """Write README.md of an export: steps for the user, and conventions in which engines differ.
+
+    If the bake has irradiance, a last line gives the suggested exposure of its manifest.
 
     Parameters
     ----------
+    bake : Path
+        Folder of the bake.
     target : Path
     title : str
     scale, uv, rows : str
@@ -97,6 +106,11 @@ def write_readme(target: Path, title: str, *, scale: str, uv: str, rows: str, st
     """
     lines = [f"# {title}", "", *steps, ""]
     lines += [f"- Scale: {scale}", f"- UV set: {uv}", f"- Row order: {rows}"]
+    exposure = read_manifest(bake).get(EXPOSURE_KEY)
+    if exposure is not None:
+        lines.append(
+            f"- Exposure: for a display, multiply albedo x E / pi by {exposure:g} (`{EXPOSURE_KEY}`)."
+        )
     write_text(target / "README.md", "\n".join(lines) + "\n")
 
 

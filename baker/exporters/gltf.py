@@ -17,6 +17,7 @@ class GltfExport:
         """Write the files of the export into `target`."""
         link_file(bake / SCENE_NAME, target / SCENE_NAME)
         write_readme(
+            bake,
             target,
             "Plain glTF",
             steps=(

@@ -52,6 +52,7 @@ class GodotExport:
         for name in FILES_3:
             write_text(target / "godot3" / name, template("godot", f"godot3/{name}"))
         write_readme(
+            bake,
             target,
             "Lightmaps for Godot",
             steps=(

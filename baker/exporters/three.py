@@ -18,6 +18,7 @@ class ThreeExport:
         place_bake(bake, target)
         write_text(target / "lightmap.js", template("three", "lightmap.js"))
         write_readme(
+            bake,
             target,
             "Lightmaps for three.js",
             steps=(

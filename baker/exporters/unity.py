@@ -49,6 +49,7 @@ class UnityExport:
             (target / script).parent.mkdir(exist_ok=True)
             write_text(target / script, template("unity", Path(script).name))
         write_readme(
+            bake,
             target,
             "Lightmaps for Unity",
             steps=(

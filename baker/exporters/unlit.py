@@ -22,7 +22,7 @@ from baker.core.parallel import thread_count
 from baker.core.progress import silent
 from baker.core.scene import Material, Scene, Texture
 from baker.core.texels import TexelBuffer
-from baker.exporters.common import write_json, write_readme
+from baker.exporters.common import EXPOSURE_KEY, write_json, write_readme
 from baker.finish.dilate import dilate
 from baker.io.bake.read_bake import StoredBake, read_bake
 from baker.io.gltf.build_document import new_document
@@ -46,8 +46,11 @@ class UnlitExport:
         page, covered = radiance(stored)
         exposure = exposure_for(page[..., :3], covered)
         (target / "scene.glb").write_bytes(unlit_glb(stored, page, exposure))
-        write_json(target / "lightmap.json", {"version": 1, "scene": "scene.glb", "exposure": exposure})
+        suggested = stored.manifest.get(EXPOSURE_KEY)
+        described = {"version": 1, "scene": "scene.glb", "exposure": exposure, EXPOSURE_KEY: suggested}
+        write_json(target / "lightmap.json", described)
         write_readme(
+            bake,
             target,
             "One unlit GLB",
             steps=(

@@ -23,6 +23,7 @@ class UnrealExport:
         place_named_bake(bake, target)
         write_text(target / "import_lightmaps.py", template("unreal", "import_lightmaps.py"))
         write_readme(
+            bake,
             target,
             "Lightmaps for Unreal Engine",
             steps=(

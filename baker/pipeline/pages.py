@@ -25,6 +25,7 @@ from baker.finish.finish import (
     open_finisher,
 )
 from baker.finish.oidn import denoiser_name
+from baker.pipeline.exposure import suggested_exposure
 from baker.pipeline.record import Record
 
 # Relative standard error before denoising above which a texel gets the status UNCONVERGED.
@@ -38,11 +39,13 @@ class TracedTexels(NamedTuple):
 
     texels : TexelBuffer
     valid : (n_front,) bool, whether a front texel has a valid point
+    albedo : (n_front, 3) float16, linear Rec.709
     transport : Transport, values of the front texels
     """
 
     texels: TexelBuffer
     valid: NDArray[np.bool_]
+    albedo: NDArray[np.float16]
     transport: Transport
 
 
@@ -100,12 +103,21 @@ def finish_pages(
         status=status,
         texel_count=np.bincount(texels.instance[:n_front], minlength=len(scene.instances)).astype(np.int64),
         statistics=statistics,
+        suggested_exposure=_exposure(traced, value),
         timings=record.timings,
         rays=record.rays,
         solve=record.solve,
         denoise=denoiser_name() if settings.denoise else {},
         warnings=tuple(record.warnings),
     )
+
+
+def _exposure(traced: TracedTexels, value: Mapping[str, NDArray[np.float32]]) -> float | None:
+    """Return the suggested exposure, or None if irradiance is not baked."""
+    if "irradiance" not in value:
+        return None
+    pixel = traced.texels.pixel[: traced.texels.n_front]
+    return suggested_exposure(value["irradiance"], pixel[traced.valid], traced.albedo[traced.valid])
 
 
 def convergence_warnings(status: NDArray[np.uint8]) -> list[SceneWarning]:

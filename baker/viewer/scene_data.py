@@ -78,6 +78,7 @@ def scene_data(bake: StoredBake) -> SceneData:
         # World position of the origin that vertex positions, the box and the camera are relative to.
         "origin": geometry.origin.tolist(),
         "camera": _camera(bake),
+        "suggestedExposure": bake.manifest.get("suggested_exposure"),
         "channels": [_channel(bake, name) for name in bake.maps],
         "status": np.bincount(bake.status.ravel(), minlength=len(TexelStatus)).tolist(),
         "instances": [_instance(bake, index) for index in range(len(bake.scene.instances))],

@@ -8,6 +8,7 @@ import json
 import math
 import re
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -72,6 +73,7 @@ def result(folder, **settings):
         lightmaps=maps,
         status=np.ones((2, SIZE, SIZE), np.uint8),
         texel_count=np.full(len(NODES), SIZE * SIZE),
+        suggested_exposure=0.0625,
     )
 
 
@@ -97,10 +99,22 @@ def test_the_exports_of_the_contract_are_there():
 def test_a_readme_of_ten_lines_says_scale_uv_and_rows(bake, name):
     text = (bake[0] / name / "README.md").read_text("utf-8")
     assert 6 <= len(text.splitlines()) <= 12
-    for key in ("- Scale: ", "- UV set: ", "- Row order: "):
+    for key in ("- Scale: ", "- UV set: ", "- Row order: ", "- Exposure: "):
         assert text.count(key) == 1
+    assert "by 0.0625 (`suggested_exposure`)" in text
     assert "TEXCOORD_" in text
     assert "v = 0 is the" in text or name == "blender"
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "gltf"])
+def test_lightmap_json_has_the_suggested_exposure(bake, name):
+    assert json.loads((bake[0] / name / "lightmap.json").read_text("utf-8"))["suggested_exposure"] == 0.0625
+
+
+def test_a_bake_without_irradiance_suggests_no_exposure(tmp_path):
+    made = replace(result(tmp_path / "in", export=("gltf",)), suggested_exposure=None)
+    write_bake(made, tmp_path / "out")
+    assert "Exposure" not in (tmp_path / "out" / "gltf" / "README.md").read_text("utf-8")
 
 
 @pytest.mark.parametrize("name", NAMES)

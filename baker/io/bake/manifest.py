@@ -88,6 +88,7 @@ def make_manifest(
             }
             for channel in result.lightmaps
         },
+        "suggested_exposure": result.suggested_exposure,
         "warnings": _warnings(result, warnings),
         "denoise": result.denoise,
         "files": files,

@@ -209,10 +209,12 @@ function short3(value) {
   return Number(value.toPrecision(3));
 }
 
-// Linear display value, 0 to 1, of a white surface with the median irradiance at exposure 0.
+// Linear display value, 0 to 1, of a white surface with the median irradiance at exposure 0, for a bake without a
+// suggested exposure.
 const MIDDLE = 0.35;
 
 function exposureOf(scene) {
+  if (scene.suggestedExposure) return scene.suggestedExposure / Math.PI;
   const light = scene.channels.find(({ name }) => name === "irradiance");
   const typical = light?.median || light?.high || 0;
   return typical > 0 ? MIDDLE / typical : 1 / Math.PI;

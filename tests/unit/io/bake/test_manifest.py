@@ -41,7 +41,7 @@ def test_every_promised_key_is_there(tmp_path: Path) -> None:
     manifest = bake(quad_result(tmp_path / "in"), tmp_path / "out")
     assert list(manifest) == [
         "version", "settings", "versions", "input", "created", "channels", "pages", "instances", "lights",
-        "timings", "rays", "solve", "statistics", "warnings", "denoise", "files",
+        "timings", "rays", "solve", "statistics", "suggested_exposure", "warnings", "denoise", "files",
     ]  # fmt: skip
     assert {
         (p["channel"], p["page"], p["file"], p["width"], p["height"], p["unit"]) for p in manifest["pages"]
