@@ -20,7 +20,12 @@ if TYPE_CHECKING:
 Scene = Annotated[Path, typer.Argument(metavar="SCENE", help=scene_file_help())]
 Out = Annotated[Path, typer.Option("--out", "-o", metavar="OUT", help="Folder to write.")]
 Force = Annotated[
-    bool, typer.Option("--force", help="Replace OUT even if baker did not write it.", rich_help_panel=FILES)
+    bool,
+    typer.Option(
+        "--force",
+        help="Replace OUT even if baker did not write it; bake even if memory may not suffice.",
+        rich_help_panel=FILES,
+    ),
 ]
 
 

@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("baker", "cli")
 # Libraries that only one file may import, because they are slow to import or hidden behind an interface.
 HEAVY = ("embreex", "xatlas", "trimesh", "tinyobjloader", "OpenEXR", "pyoidn", "pydantic", "pymeshlab")
-HEAVY += ("distributed",)
+HEAVY += ("distributed", "psutil")
 NOT_SOURCE = {
     ".git",
     ".venv",

@@ -43,7 +43,7 @@ def bake(
         Lightmap uv of the scene, a result of `unwrap` for the same Scene. Its resolution and padding replace
         those of the settings.
     force : bool
-        Replace `out` even if baker did not write it.
+        Replace `out` even if baker did not write it, and bake even if the estimated memory is not free.
     progress : Progress
         Called with stage, fraction done and a detail as text; a truthy return value cancels.
     **keywords : Unpack[BakeKeywords]
@@ -180,7 +180,7 @@ def ao(
         Lightmap uv of the scene, a result of `unwrap` for the same Scene. Its resolution and padding replace
         those of the settings.
     force : bool
-        Replace `out` even if baker did not write it.
+        Replace `out` even if baker did not write it, and bake even if the estimated memory is not free.
     progress : Progress
         Called with stage, fraction done and a detail as text; a truthy return value cancels.
     **keywords : Unpack[AoKeywords]
@@ -242,7 +242,7 @@ def save(
     export : str or sequence of str
         Engines for which a subfolder is written: "godot", "unity", "three" ...
     force : bool
-        Replace `out` even if baker did not write it.
+        Replace `out` even if baker did not write it, and bake even if the estimated memory is not free.
     progress : Progress
         Called with stage, fraction done and a detail as text; a truthy return value cancels.
 

@@ -132,9 +132,8 @@ def denoise_page(
         If `progress` returned a truthy value.
     """
     _check_input(value, covered, chart, standard_error, signed)
-    result = np.array(value)
     if not covered.any():
-        return result
+        return np.array(value)
     window = _window(covered)
     # Copy to contiguous arrays, because Numba compiles a kernel again for strided ones.
     inside = np.ascontiguousarray(covered[window])
@@ -151,6 +150,7 @@ def denoise_page(
         len(held),
         threads,
     )
+    result = np.array(value)
     result[window][inside] = held[inside][:, : value.shape[2]]
     return result
 
@@ -190,6 +190,8 @@ def _filter_window(
     picture = surround_charts(noisy / level, inside, charts, threads=denoiser.threads)
     rows, columns = (_margins(side) for side in inside.shape)
     wide = np.pad(picture, (rows, columns, (0, 0)), mode="symmetric")
+    # Free the picture before the filter allocates its memory.
+    del picture
     wide = denoiser.filter(wide, progress, signed=signed)
     return np.ascontiguousarray(wide[rows[0] : -rows[1], columns[0] : -columns[1]] * level)
 

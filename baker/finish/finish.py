@@ -224,6 +224,8 @@ def finish_page(
         if rules.signed:
             np.maximum(centred, flat.min(axis=0, initial=0.0), out=centred)
         total += centred
+        # Free the arrays before the next layer is denoised, which is the peak of a bake's memory.
+        del filled, denoised, centred, flat
     rules.clip(total)
     grown_value, grown = dilate(
         total, plan.covered, plan.chart, finisher.dilation, nearest=plan.nearest, threads=finisher.threads

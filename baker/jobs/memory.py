@@ -5,11 +5,10 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from baker.channels.channel import chosen_channels
-from baker.core.budget import Workload, image_bytes, surface_area, texels_and_pages
 from baker.core.errors import SettingsError
 from baker.core.settings import BakeSettings
 from baker.io.load import load_for_bake
+from baker.pipeline.memory_check import estimate_peak_of
 
 _UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 
@@ -51,16 +50,4 @@ def estimate_peak(path: Path, settings: BakeSettings) -> int:
     InputError
         If the scene cannot be read.
     """
-    scene = load_for_bake(path, settings)
-    channels = chosen_channels(settings.channels).values()
-    area = surface_area(scene) if settings.density is not None else 0.0
-    texels, pages = texels_and_pages(settings, area)
-    workload = Workload(
-        texels=texels,
-        pages=pages,
-        triangles=scene.n_triangles,
-        image_bytes=image_bytes(scene),
-        light=any(channel.needs_light for channel in channels),
-        ambient_occlusion=any(channel.needs_ambient_occlusion for channel in channels),
-    )
-    return workload.peak_bytes(settings)
+    return estimate_peak_of(load_for_bake(path, settings), settings)

@@ -30,6 +30,7 @@ from baker.io.load import load_for_bake
 from baker.io.protected_files import check_outputs
 from baker.kernels.not_kept import cache_warnings
 from baker.pipeline import precompile
+from baker.pipeline.memory_check import check_memory
 from baker.pipeline.pages import TracedTexels, finish_pages
 from baker.pipeline.prepare import prepare_scene
 from baker.pipeline.record import Record
@@ -61,7 +62,7 @@ def bake(
     progress : Progress
         Called with the stage, the share of it that is done, and a detail; a truthy return value cancels.
     force : bool
-        Replace `out` even if baker did not write it.
+        Replace `out` even if baker did not write it, and bake even if the estimated memory is not free.
     executor : TileExecutor, optional
         Runs the tiles of the ray stages; by default, they run in this process.
     atlas : Atlas, optional
@@ -91,6 +92,8 @@ def bake(
         scene = _load(scene, settings, record)
         if atlas is not None:
             settings = settings_of_atlas(scene, atlas, settings)
+        if not force:
+            check_memory(scene, settings, channels)
         compiling = precompile.restart_for_materials(compiling, scene)
         record.progress = precompile.labelled(compiling, progress)
         atlas = _layout(scene, atlas, settings, record)

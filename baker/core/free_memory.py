@@ -1,0 +1,76 @@
+"""The memory that this process may use: what the machine has free, and limits of control groups."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+PROC, CGROUPS = Path("/proc"), Path("/sys/fs/cgroup")
+# Version 1 reports a limit near the largest 64-bit number if there is none.
+_NO_LIMIT = 1 << 60
+
+
+def free_memory() -> int:
+    """Return the free memory of the machine, or what is left of the control group's limit if that is less.
+
+    Returns
+    -------
+    int
+        Bytes, without swap space.
+    """
+    import psutil
+
+    return min([int(psutil.virtual_memory().available), *_left_in_groups(PROC, CGROUPS)])
+
+
+def used_memory() -> int:
+    """Return the resident memory of this process.
+
+    Returns
+    -------
+    int
+        Bytes.
+    """
+    import psutil
+
+    return int(psutil.Process().memory_info().rss)
+
+
+def _left_in_groups(proc: Path, cgroups: Path) -> Iterator[int]:
+    """Yield what is left of each memory limit of Linux control groups that this process is subject to, bytes.
+
+    Files in the page cache that the kernel can drop count as free.
+    """
+    for line in _text(proc / "self" / "cgroup").splitlines():
+        _, _, rest = line.partition(":")
+        controllers, _, group = rest.partition(":")
+        if not controllers:
+            folder, names = cgroups, ("memory.max", "memory.current", "inactive_file")
+        elif "memory" in controllers.split(","):
+            folder = cgroups / "memory"
+            names = ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
+        else:
+            continue
+        # Limits of all groups from this process's to the root apply. In a container, the root of the mount
+        # is the group of the container, and the path of the group may not exist.
+        path = folder / group.lstrip("/")
+        for parent in (path, *path.parents):
+            yield from _left(parent, *names)
+            if parent == folder:
+                break
+
+
+def _left(group: Path, limit_name: str, used_name: str, cache_name: str) -> Iterator[int]:
+    limit, used = _text(group / limit_name).strip(), _text(group / used_name).strip()
+    if not (limit.isdecimal() and used.isdecimal()) or int(limit) >= _NO_LIMIT:
+        return
+    rows = (row.split() for row in _text(group / "memory.stat").splitlines())
+    cache = next((int(row[1]) for row in rows if len(row) == 2 and row[0] == cache_name), 0)
+    yield max(int(limit) - int(used) + cache, 0)
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text("utf-8")
+    except (OSError, ValueError):
+        return ""
