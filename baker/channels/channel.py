@@ -92,7 +92,8 @@ class Channel(ChannelDescription):
     layers: Callable[[Transport], tuple[Layer, ...]]
 
     def __post_init__(self) -> None:
-        """Raise ValueError unless `signed` is true exactly if `lower` is negative."""
+        """Raise ValueError if `signed` contradicts `lower`: a channel is signed if and only if `lower` is
+        negative."""
         if self.signed != (self.lower < 0.0):
             raise ValueError("a channel is signed if and only if its lower bound is negative")
 

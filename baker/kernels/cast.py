@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Triangle and distance of the first hit of each of n rays."""
+"""Traces n rays to their first hits, and writes triangle and distance of each hit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Random choice of points on emissive triangles (emitters), to which shadow rays are cast.
+"""Chooses random points on emissive triangles (emitters), to which shadow rays are cast.
 
 Neighbouring triangles are grouped into clusters. A point is chosen in three steps:
 

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Hemisphere rays of sixteen texels at a time, in loops that the compiler vectorises.
+"""Generates hemisphere rays of sixteen texels at a time, in loops that the compiler vectorises.
 
 `frame` stores the tangent frame at one point of each texel. For each sample, two Sobol numbers are scrambled,
 mapped to the hemisphere about +z, and rotated into the frame. All rows of `frame` are at constant offsets in

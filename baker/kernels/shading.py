@@ -33,7 +33,7 @@ class Shading(NamedTuple):
     alpha : AlphaTable
         Triangles that let light through.
     metallic, roughness : (M,) float32
-        Metallic and roughness factors. Bakes do not read these and the two arrays below.
+        Metallic and roughness factors. Bakes read neither these two arrays nor the two arrays below.
     reflection_texture : (M,) int32
         Number of the texture that scales metallic (blue) and roughness (green), -1 for none.
     reflection_uv : (V, 2) float32

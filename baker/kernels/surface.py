@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""The sample points of texels, from which rays start.
+"""Computes the sample points of texels, from which rays start.
 
 Each texel has 16 points. They are uniformly distributed in the part of the texel's square that triangles
 cover, and stratified by a scrambled (0,2)-net. On low-poly curved surfaces, points are moved to the smooth
@@ -35,10 +35,10 @@ OFFSET, ROUNDING = 1.0e-5, 1.9e-6
 # Distance by which points near the border of their triangle are moved towards its centroid, as a multiple of
 # the offset. The distance is at most half of the distance to the centroid.
 INWARD = 2.0
-# Smallest barycentric coordinate of a point. Below it, the point is near the border.
+# Limit of the smallest barycentric coordinate of a point. Below this limit, the point is near the border.
 BORDER = 0.01
-# Cosine between a vertex normal and the face normal. Up to it, the vertex is on a hard edge, not on a smooth
-# surface, and is left out of the shadow-terminator offset (Hanika 2021).
+# Limit of the cosine between a vertex normal and the face normal. Up to this limit, the vertex is on a hard
+# edge, not on a smooth surface, and is left out of the shadow-terminator offset (Hanika 2021).
 STEEPEST = 0.7
 _u = np.uint32
 # Rows of the output of `load_flat`: corner 0, edges 1 and 2, signed face normal (3 each), triangle size (1).

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Centroid, position, normal, area and albedo of texels, from the triangles inside their squares."""
+"""Computes centroid, position, normal, area and albedo of texels, from the triangles inside their squares."""
 
 from __future__ import annotations
 

@@ -5,8 +5,8 @@
 L is the luminance of the radiance. For a part of a textured triangle, L is the mean of R, G and B. The power
 of a two-sided triangle is twice as large. Textured triangles are cut into parts (`lights.emissive_texture`),
 and each part is an emitter. If the texture is constant in a part, the part has its exact mean radiance
-instead of the texture. So has a part with too much detail that cannot be cut further, because the number of
-parts is limited.
+instead of the texture. If a part has too much detail, but the limit of the number of parts prevents further
+cuts, it has its mean radiance, too.
 
 Based on: see `kernels.emitters`.
 """
@@ -39,7 +39,7 @@ from baker.lights.emissive_texture import EmissiveTextures, brightness, cut
 
 _LUMINANCE = np.array(LUMINANCE_WEIGHTS)
 # Largest number of clusters. The time to compute the weights of clusters for a tile of texels is proportional
-# to it.
+# to the number of clusters.
 MAX_CLUSTERS = 256
 # Largest number of parts of all textured triangles, minus the number of textured triangles.
 MOST_PARTS = 32768
@@ -50,9 +50,9 @@ _CROWD = 64.0
 # the radiance is treated as uniform. Above _SPARSE, the part has its mean radiance, because most texture
 # samples would be black, and no more parts were available to divide it.
 _CONSTANT, _SPARSE = 1.0e-6, 1.0
-# Longest edge of a part, as a share of the scene's diagonal. Up to it, a part that is also at most one texel
-# of the texture wide has its mean radiance: the difference is visible only from small distances, and the mean
-# has no noise.
+# Limit of the longest edge of a part, as a share of the scene's diagonal. Up to this limit, a part that is
+# also at most one texel of the texture wide has its mean radiance instead of the texture. The difference is
+# visible only from small distances, and sampling the mean causes no noise.
 _SMALL = 1.0 / 128.0
 
 

@@ -26,18 +26,19 @@ from baker.kernels.textures import TexturePack
 from baker.lights.texture_levels import TextureLevels, fair_limit
 from baker.lights.uv_integral import uv_means
 
-# Noise of a triangle, as the module defines it. Up to it, the triangle is not cut further.
+# Limit of the noise of a triangle, which the module's docstring defines. Up to this limit, the triangle is
+# not cut further.
 ENOUGH = 0.05
 # Edge length of a part, as a share of its triangle's edge. A part this small is not cut further, because
 # float32 barycentrics would not distinguish smaller parts.
 _SMALLEST = 2.0**-14
-# Gain (noise times weight) of a part, as a share of the largest gain. Parts above it are cut in the same
-# round.
+# Limit of the gain (noise times weight) of a part, as a share of the largest gain. All parts above this limit
+# are cut in the same round.
 _TOGETHER = 0.125
 # MOST_CROSSED: total number of texel lines (borders between two rows or columns of texels) that the edges of
-# all parts may cross, which limits the time to about a second. To stay below it, means of parts are computed
-# from a smaller version of their texture. FEW_CROSSED: number of texel lines that the edges of one part
-# cross. Up to it, the part always uses the full resolution.
+# all parts may cross, which limits the time to about a second. To stay below this limit, means of parts are
+# computed from a smaller version of their texture. FEW_CROSSED: limit of the number of texel lines that the
+# edges of one part cross. Up to this limit, the part always uses the full resolution.
 MOST_CROSSED, FEW_CROSSED = 4.0e6, 64.0
 # Share of the remaining number of texel lines that each round of cutting may cross, even if many rounds
 # follow.

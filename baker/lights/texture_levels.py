@@ -1,4 +1,4 @@
-"""Emissive textures at lower resolutions, for triangles whose edges cross too many texel lines.
+"""Computes emissive textures at lower resolutions, for triangles whose edges cross too many texel lines.
 
 A texel line is a border between two rows or columns of texels. Each texel of a smaller texture contains the
 mean RGB of the original texture over its area, and, in the fourth column, the variance of the original
@@ -19,8 +19,9 @@ from baker.kernels.textures import HEIGHT, STORAGE, WIDTH, TexturePack, decoded,
 from baker.lights.uv_integral import BLOCK, N_SUMS, RowSums, fill_row_sums
 
 _CLAMP = 2
-# Width or height of a mip level, texels. Above it, the next coarser level is used instead, if width and
-# height are even. (If one is odd, the next level omits the last row or column and has different means.)
+# Limit of the width and height of a mip level, texels. Above this limit, the next coarser level is used
+# instead, if width and height are even. (If one is odd, the next level omits the last row or column and has
+# different means.)
 LARGEST_SIDE = 2048
 # Largest number of rows or columns that are averaged in one step, which limits the working memory.
 _STRIP = 256

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Exact means of a texture over triangles in uv space, of any size.
+"""Computes exact means of a texture over triangles in uv space, of any size.
 
     integral of f over a triangle = closed integral of F(x, y) dy along its edges,   dF / dx = f     (Green)
 
@@ -26,14 +26,14 @@ from baker.trace.jit import inner, kernel, larger, scratch, smaller
 BLOCK = 32
 # Number of columns of f: red, green, blue, and the weighted sum of their squares.
 N_SUMS = 4
-# area / (longest edge)^2 of a triangle. Up to it, the triangle is treated as degenerate: it is integrated
-# along its longest edge.
+# Limit of area / (longest edge)^2 of a triangle. Up to this limit, the triangle is treated as degenerate: it
+# is integrated along its longest edge.
 _THIN = 1.0e-9
-# Largest side of a triangle's uv bounding box, texels. Up to it, the spread of a bilinear texture is
-# estimated from sixteen points.
+# Limit of the largest side of a triangle's uv bounding box, texels. Up to this limit, the spread of a
+# bilinear texture is estimated from sixteen points.
 _FEW_CELLS = 3.0
-# integral / (sum of the magnitudes of its terms). Up to it, an integral is treated as rounding error and set
-# to 0.
+# Limit of integral / (sum of the magnitudes of its terms). Up to this limit, an integral is treated as
+# rounding error and set to 0.
 _ROUNDING = 1.0e-12
 # Spread (variance / mean^2) that a triangle gets if its mean is positive but the texture is black at all
 # sixteen points.

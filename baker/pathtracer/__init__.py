@@ -6,7 +6,7 @@ package share:
 - the scene, resolved materials, textures, alpha and solids;
 - the Embree scene and its hit filters;
 - random numbers and direction sampling of `kernels.sampling`;
-- `lights.emissive_texture.cut`, which divides textured emitters. An error in it would change only sampling
+- `lights.emissive_texture.cut`, which divides textured emitters. An error in `cut` would change only sampling
   densities.
 
 This package has its own code for emitters, lights without area, shading, estimators and sums.

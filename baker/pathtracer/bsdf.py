@@ -22,7 +22,7 @@ import math
 from baker.trace.jit import inner
 
 INV_PI = 1.0 / math.pi
-# GGX width a. Below it, the specular lobe is treated as a mirror.
+# Limit of the GGX width a. Below this limit, the specular lobe is treated as a mirror.
 SMOOTH = 1.0e-3
 # F0 (reflectance at normal incidence) of a non-metal.
 DIELECTRIC = 0.04

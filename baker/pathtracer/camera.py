@@ -117,8 +117,8 @@ def camera_rays(
     pixel : (n,) int64
         Numbers of the pixels: row * width + column, row 0 on top.
     samples : int
-        Number of directions through each pixel. They form a lattice in the pixel's square, which is shifted
-        at random for each pixel and pass.
+        Number of directions through each pixel. They form a lattice in the pixel's square. The lattice is
+        shifted at random for each pixel and pass.
     seed : int
         Seed of the shifts.
     number : int

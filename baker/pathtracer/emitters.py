@@ -1,4 +1,4 @@
-"""The emissive triangles of a scene, for the path tracer.
+"""Finds the emissive triangles of a scene, for the path tracer.
 
 This module does not use `lights.emissive.build_emitters`. So an emitter that the bake misses by a mistake
 there is still in the reference. From the resolved materials, this module computes which triangles emit, and
@@ -29,9 +29,9 @@ from baker.lights.emissive_texture import EmissiveTextures, Parts, brightness, c
 #     EMITTER_NORMAL      unit face normal (3)
 #     EMITTER_AREA        m2
 #     EMITTER_TWO_SIDED   1 if both sides emit, else 0
-#     EMITTER_CHANCE      probability with which it is chosen
+#     EMITTER_CHANCE      probability with which the emitter is chosen
 #     EMITTER_RADIANCE    radiance without texture, cd/m2 (3)
-#     EMITTER_TEXTURED    1 if it has a texture, else 0
+#     EMITTER_TEXTURED    1 if its emission has a texture, else 0
 #     EMITTER_PART        position in the scene's triangle (3): barycentrics b1, b2 of the emitter's corner 0;
 #                         edge length divided by the triangle's edge length, negative if the part is
 #                         rotated by 180 degrees. (0, 0, 1) for a whole triangle

@@ -1,4 +1,4 @@
-"""First hits of camera rays: position, triangle, albedo and normal."""
+"""Traces camera rays to their first hits, and returns position, triangle, albedo and normal of each hit."""
 
 from __future__ import annotations
 

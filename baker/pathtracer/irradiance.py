@@ -1,4 +1,4 @@
-"""Irradiance and ambient occlusion at points of surfaces, in passes, with standard errors.
+"""Estimates irradiance and ambient occlusion at surface points, in passes, with standard errors.
 
     E  = pi mean(L)                        AO = share of cosine-weighted rays without a hit
 

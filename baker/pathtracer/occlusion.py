@@ -1,10 +1,10 @@
-"""Cosine-weighted occlusion rays from points of surfaces: the reference of ambient occlusion.
+"""Casts cosine-weighted occlusion rays from surface points; `verify` compares bakes with the result.
 
 A packet holds one ray from each of eight neighbouring points, all with the same sample number. The leading
 bits of the random numbers of a sample are the same for all points (`kernels.sampling.shared_bits_mask`), so
 the eight rays are nearly parallel. If the points are also close together, the packet is traced with Embree's
-coherent flag, which is faster. Each loop over lanes accesses one array, so that the compiler vectorizes the
-loop (see `path_blocks`).
+coherent flag, which is faster. Loops over lanes that only compute access a single array, because the compiler
+vectorizes loops of eight iterations only then (see `path_blocks`).
 
 Based on: Morton, A computer oriented geodetic data base and a new technique in file sequencing, 1966.
 """
@@ -39,8 +39,8 @@ _w = np.uint32
 _ZERO, _ONE = _f(0.0), _f(1.0)
 _L = BLOCK_WIDTH
 # A packet is traced as coherent if the extent of its origins is below `_ALIKE` times the smaller of two
-# lengths: the ray length, and `_FAR` times `Surfaces.min_offset_scale`, which is a tenth of the scene's
-# diagonal.
+# lengths. One is the ray length. The other is a tenth of the scene's diagonal, `_FAR` times
+# `Surfaces.min_offset_scale`.
 _ALIKE, _FAR = _f(0.125), _f(100.0)
 # Approximate number of points that `are_dense` examines.
 _LOOK = 128
@@ -57,9 +57,10 @@ def alike_within(max_distance: np.float32, min_offset_scale: np.float32) -> np.f
 
 
 def are_dense(position: NDArray[np.float64], alike: float) -> bool:
-    """Return whether most of some points (n, 3) are closer than `alike`, metres, to the next point.
+    """Return whether most points (n, 3) are closer than `alike`, metres, to the next point of the array.
 
-    About `_LOOK` points are examined. Sorting by `near_together` saves time only if the result is True.
+    About `_LOOK` points, evenly distributed over the array, are examined. Sorting with `near_together` saves
+    time only if the result is True, because packets of distant points are not traced as coherent.
     """
     first = np.arange(0, len(position) - 1, max(len(position) // _LOOK, 1))
     step = abs(position[first + 1] - position[first]).max(axis=1)
@@ -93,8 +94,8 @@ def seed_lanes(words, name, group, number, salt):  # type: ignore[no-untyped-def
 def number_lanes(words, first, second, shared):  # type: ignore[no-untyped-def]
     """Write a pair of random numbers in [1, 2) for each lane, to rows U_DIRECTION and W_DIRECTION.
 
-    The bits in the mask `shared` are equal to the bits of (first, second). The other bits are scrambled with
-    the lane's seeds.
+    The numbers are scrambled while they are bit-reversed. Bits that the mask `shared` selects are copied from
+    (first, second). The other bits are scrambled with the lane's seeds.
 
     words : block, uint32; first, second : uint32, a bit-reversed Sobol point
     shared : uint32, see `open_rays`
@@ -198,14 +199,15 @@ def open_rays(  # type: ignore[no-untyped-def]
 ):
     """Cast n cosine-weighted rays from each of m points, and add the number without a hit to `out`.
 
-    position, normal, face_normal : (m, k, 3) float64, k positions of each point with shading and geometric
-        normals. Sample s of pass p starts at position (p n + s) modulo k. Tracing is fastest if consecutive
-        points are close together
+    position, normal, face_normal : (m, n_positions, 3) float64, n_positions positions of each point, with
+        shading and geometric normals. Sample s of pass p starts at position (p n + s) modulo n_positions.
+        Tracing is fastest if consecutive points are close together
     name : (m,) int64, numbers of the points, on which their random numbers depend
     memory : `PathMemory`
     arguments : (2, 5) int64, from `packets.arguments_of`; row 0 for incoherent, row 1 for coherent packets
     sobol_points : (n, 2) uint32, bit-reversed Sobol points of the n samples of a pass
-    shared : uint32, mask of the bits of bit-reversed random numbers that are the same for all points
+    shared : uint32, mask that selects the bits of bit-reversed random numbers that are the same for all
+        points
     max_distance : float32, metres, length of the rays
     alike : float32, metres, from `alike_within`
     sizes : (2,) float32, metres, `Surfaces.min_offset_scale` and `.default_size`

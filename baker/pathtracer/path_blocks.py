@@ -3,7 +3,7 @@
 A block is a ray packet of width 8, followed by further rows of eight numbers. A lane is one column of a block
 and holds one path. Rays are traced and shaded in place. All rows are at constant offsets in one array, for
 two reasons. The compiler vectorizes loops over lanes only if it can prove that rows do not overlap. It
-vectorizes loops of only eight iterations if they access a single array. Lanes of ended paths are refilled
+vectorizes loops of eight iterations only if they access a single array. Lanes of ended paths are refilled
 with paths from the last blocks, so that packets stay full.
 
 Based on: Laine, Karras and Aila, Megakernels considered harmful, 2013 (many paths between rays); van

@@ -101,8 +101,8 @@ from baker.trace.packets import DIR_X, DIR_Y, DIR_Z, GEOM_ID, HIT_U, HIT_V, NO_H
 
 _f = np.float32
 _L = BLOCK_WIDTH
-# Number of lights, including the sky. Up to it, a light is chosen by linear search, above it by binary
-# search.
+# Limit of the number of lights, including the sky. Up to this limit, a light is chosen by linear search,
+# above it by binary search.
 _FEW = 16
 _INV_2_32 = 1.0 / 4294967296.0
 # Stack arrays of `trace_paths`.

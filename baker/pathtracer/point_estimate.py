@@ -1,4 +1,4 @@
-"""Means over passes and their standard errors, for points that may have different numbers of passes."""
+"""Computes means over passes and their standard errors; points may have different numbers of passes."""
 
 from __future__ import annotations
 

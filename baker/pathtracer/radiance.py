@@ -1,4 +1,4 @@
-"""Radiance along camera rays, in passes; `pathtracer.irradiance` defines a pass."""
+"""Estimates the radiance along camera rays, in passes; `pathtracer.irradiance` defines a pass."""
 
 from __future__ import annotations
 

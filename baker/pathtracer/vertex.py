@@ -79,8 +79,8 @@ N_ROWS = 32
 # Columns of `ray`, a ray to a light: unit direction (3), length in metres, barycentrics of its end on an
 # emitter.
 RAY_LENGTH, RAY_B1, RAY_B2 = 3, 4, 5
-# Cosine between the interpolated normal and the view direction. Up to it, surfaces that are not Lambertian
-# use the geometric normal instead.
+# Limit of the cosine between the interpolated normal and the view direction. Up to this limit, surfaces that
+# are not Lambertian use the geometric normal instead of the interpolated normal.
 GRAZE = 1.0e-3
 # Factors of the offset of ray origins, as in `kernels.surface`. The offset is OFFSET times the smaller of two
 # lengths: the largest coordinate of the origin, and the size of the triangle. It is at least ROUNDING

@@ -1,9 +1,9 @@
-"""Direct light of every texel: emissive triangles, then lights without area.
+"""Computes the direct light of every texel, from emissive triangles and from lights without area.
 
 Two estimates of the direct irradiance are computed:
 
 - `weighted` is the part that MIS (multiple importance sampling) assigns to shadow rays. The final gather adds
-  the rest, from its rays that hit emitters. The lightmap contains both.
+  the remaining part, from its rays that hit emitters. The lightmap contains the sum of both parts.
 - `complete` is all direct light. Surfaces reflect it in the first bounce.
 """
 
@@ -38,8 +38,8 @@ TILE = 512
 WEIGHTED, COMPLETE = slice(0, 3), slice(3, 6)
 # Number of hemisphere rays per texel that `complete` combines with shadow rays, at texels close to emitters.
 N_HEMISPHERE = 4
-# Radius / distance of a visible emitter cluster. Above it, texels are close to the cluster and cast
-# `N_HEMISPHERE` rays.
+# Limit of radius / distance of a visible emitter cluster. Above this limit, texels are close to the cluster
+# and cast `N_HEMISPHERE` rays.
 CLOSE = 0.5
 
 
@@ -56,9 +56,10 @@ class DirectLight:
     variance : (n,) float32, lx2
         Variance of (R + G + B) / 3 of `weighted`.
     analytic : (n,) uint8
-        1 where `weighted` contains all light of the visible emitters, in closed form.
+        1 for entries whose `weighted` contains all light of the visible emitters, computed in closed form.
     rays : int
-        Number of rays: those cast for emitters, plus 16 per entry and light without area, an upper bound.
+        Number of rays cast for emitters, plus 16 for each pair of an entry and a light without area. The
+        second number is an upper bound, because points that the light does not illuminate cast no ray.
     """
 
     weighted: NDArray[np.float32]

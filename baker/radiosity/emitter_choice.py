@@ -8,8 +8,8 @@ shadow rays, the probe rays, are cast from the tile to each cluster to find whet
 - Clusters that no probe ray reaches are called hidden. They form a separate stratum with few samples, which
   MIS combines with gather rays that hit these clusters. So a cluster that is visible only through a small
   opening still contributes.
-- If a cluster that outshines others is visible from only a part of the tile, visible and hidden clusters are
-  found for each block of up to sixteen consecutive texels.
+- If a much brighter cluster than others (`_OUTSHINES`) is visible from only a part of the tile, visible and
+  hidden clusters are found for each block of up to sixteen consecutive texels.
 
 Based on: Ward, Adaptive shadow testing for ray tracing, 1991; Georgiev et al., Importance caching for complex
 illumination, 2012.
@@ -43,19 +43,20 @@ from baker.trace.packets import PACKET_WIDTH, PacketBuffers
 _MOST_RAYS, _FEWEST_RAYS = 32, 4
 # Number of probe rays of a tile to all clusters, as a share of the tile's shadow rays.
 _COST = 0.06
-# Number of clusters in the scene. Up to it, all hidden clusters are in the separate stratum.
+# Limit of the number of clusters in the scene. Up to this limit, all hidden clusters are in the separate
+# stratum.
 _FEW = 32
-# Total weight (power / distance^2) of hidden clusters, as a share of the visible clusters' total weight. If
-# there are more than _FEW clusters, the dimmest hidden clusters up to this total are sampled with the visible
-# ones.
+# Limit of the total weight (power / distance^2) of hidden clusters, as a share of the visible clusters' total
+# weight. If there are more than _FEW clusters, the dimmest hidden clusters, up to this limit of their total
+# weight, are sampled together with the visible clusters.
 _HARMLESS = 0.25
-# Ratio of the weights of two visible clusters. Above it, clusters are chosen for each block if the cluster of
-# larger weight is visible from only a part of the tile.
+# Limit of the ratio of the weights of two visible clusters. Above this limit, clusters are chosen for each
+# block if the cluster of larger weight is visible from only a part of the tile.
 _OUTSHINES = 4.0
-# Cosine between the normals of consecutive texels. Below it, a new block begins.
+# Smallest cosine between the normals of consecutive texels of a block. Below this cosine, a new block begins.
 _TURN = 0.5
-# Ratio between the largest and the smallest power per area of all clusters. Up to it, clusters that form one
-# connected group are treated as one light, and no probe rays are cast.
+# Limit of the ratio between the largest and the smallest power per area of all clusters. Up to this limit,
+# clusters that form one connected group are treated as one light, and no probe rays are cast.
 _ALIKE = 4.0
 # Number of shadow rays to hidden clusters, as a share of the number of shadow rays to visible clusters.
 _HIDDEN_SHARE = 1.0 / 8.0
@@ -234,7 +235,7 @@ class EmitterChooser:
         return asked, seen
 
     def _weights(self, all_emitters: TileEmitters, origin: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Return (C,) float64: power / distance^2 of each cluster; 0 if it faces away from the points.
+        """Return (C,) float64: power / distance^2 of clusters, 0 if a cluster faces away from the points.
 
         origin : (m, w, 3) float32, metres, world; distances are from the centre of the points' bounding box
         """

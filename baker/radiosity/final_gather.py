@@ -1,4 +1,4 @@
-"""The final gather: irradiance and ambient occlusion of the texels in the page, from hemisphere rays.
+"""The final gather: computes irradiance and ambient occlusion of the texels in the page with hemisphere rays.
 
 Each ray reads the light that the texel at its hit reflects. Ambient occlusion uses the same rays. Front
 texels are the entries stored in the page; the backs of double-sided surfaces are not gathered.

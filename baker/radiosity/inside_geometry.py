@@ -4,8 +4,8 @@ Each texel has 16 points. A point is inside geometry if it lies in a solid (`top
 rays hit black backs, the backs of one-sided surfaces.
 
 A ray from inside a solid first hits the solid's back or an object in the solid. A ray from outside never hits
-a back of a closed surface first, except by passing through an edge. Therefore two rays that first hit backs
-of solids prove that a point is inside.
+a back of a closed surface first, except if it passes through an edge. This happens rarely, so two rays that
+first hit backs of solids are taken as proof that a point is inside.
 
 A first pass casts a few rays from every texel to find candidates. A second pass tests each point of the
 candidates and of their neighbours. So a texel that lies half under a box keeps the valid points of its

@@ -147,7 +147,7 @@ def _choose(
     pair: NDArray[np.int64],
     weight: NDArray[np.float64],
 ) -> None:
-    """Write the region with the largest positive weight of each invalid texel to `image`.
+    """For each invalid texel, write the region with the largest positive weight to `image`.
 
     invalid : (b, 2) int64, row and column; image : (H, W) int32, region of each pixel
     pair (k, 2), weight (k,) : from `_lookups`

@@ -1,8 +1,8 @@
 """Finds texels in narrow gaps: under a rug, between books, between a cupboard and the wall.
 
-Inside a gap, light decreases with the depth, over about one width of the gap. A patch has a single radiosity.
-If a patch contained the lit floor beside a rug and the floor under it, both would get the same radiosity.
-Therefore texels inside gaps and texels outside gaps belong to different patches.
+Light decreases strongly between the opening of a gap and a depth of about one gap width. A patch has a single
+radiosity. If a patch contained the lit floor beside a rug and the floor under it, both would get the same
+radiosity. Therefore texels inside gaps and texels outside gaps belong to different patches.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from baker.radiosity.kernels.gather import estimate_occlusion
 from baker.radiosity.trace_job import TraceJob
 
 # _RAYS: number of rays per texel.
-# _EARLY_OUT: number of rays per texel. If at most one of the first _EARLY_OUT rays of each of sixteen
-# consecutive texels is blocked, these texels are outside gaps.
+# _EARLY_OUT: number of rays per texel after which tracing may stop. If at most one of the first _EARLY_OUT
+# rays of each of sixteen consecutive texels is blocked, these texels are outside gaps.
 _RAYS, _EARLY_OUT = 16, 4
-# _OPEN: share of unblocked rays of a texel. Below it, the texel lies in a gap.
+# _OPEN: limit of the share of unblocked rays of a texel. Below this limit, the texel lies in a gap.
 # _NEAR: length of the rays, in texel sides, that find gaps about as wide as a texel.
 # _FAR: length of the rays, in texel sides, that find gaps about as wide as a patch.
 _OPEN, _NEAR, _FAR = 0.25, 2.0, 8.0

@@ -1,8 +1,9 @@
-"""Patches: blocks of texels of one chart with similar normals, the surface elements of the radiosity solve.
+"""Groups texels into patches: blocks of texels of one chart with similar normals.
 
-Texels inside narrow gaps and texels outside gaps belong to different patches. In gaps about a texel wide,
-light reaches only a few gap widths deep, but a patch has a single radiosity. Therefore each texel in such a
-gap is a separate patch, if at most `max_patches` texels lie in gaps of this width.
+Patches are the surface elements of the radiosity solve. Texels inside narrow gaps and texels outside gaps
+belong to different patches. In gaps about a texel wide, light reaches only a few gap widths deep, but a patch
+has a single radiosity. Therefore each texel in such a gap is a separate patch, if at most `max_patches`
+texels lie in gaps of this width.
 
 Based on: Hanrahan, Salzman and Aupperle, A rapid hierarchical radiosity algorithm, 1991 (distant transport
 needs no fine elements); Smits, Arvo and Greenberg, A clustering algorithm for radiosity in complex
@@ -123,7 +124,7 @@ def build_patches(
 def _smallest_block(
     texels: TexelBuffer, level: NDArray[np.uint8], chosen: NDArray[np.int64], max_patches: int
 ) -> int:
-    """Return the smallest side of blocks, texels, that gives at most `max_patches` blocks of chosen entries.
+    """Return the smallest block side, texels, that gives at most `max_patches` blocks of chosen entries.
 
     chosen : (m,) int64, entries
     """
@@ -174,7 +175,7 @@ def _blocks(
         join_linked(within, root)
         linked = np.zeros(int(texels.chart.max()) + 1, bool)
         linked[texels.chart[link[:, 0]]] = True
-        # Do not split blocks of charts without links, which no surface cuts.
+        # Do not split blocks of charts without links, because no surface cuts these charts.
         root = np.where(linked[texels.chart], root, first[block].astype(np.int32))
         _, first, inverse = np.unique(root, return_index=True, return_inverse=True)
         block = inverse.reshape(-1)

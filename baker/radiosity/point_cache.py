@@ -1,4 +1,4 @@
-"""The 16 sample points of each texel, from which rays start.
+"""Computes and caches the 16 sample points of each texel, from which rays start.
 
 Points are computed tile by tile to save memory. In small scenes they are also stored for later stages,
 because computing the points takes about a tenth of the time of tracing their rays.
@@ -114,8 +114,8 @@ def some_points(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return `origin` and `normal` (m, 1, 3) of one point of each chosen entry, see `points_of`.
 
-    chosen : (m,) int64, entries; wanted : (m,) uint8, number of one point of each, 0 to 15
-    cache : the points are read from it if it holds those of all entries; else they are computed
+    chosen : (m,) int64, entries; wanted : (m,) uint8, number, 0 to 15, of one point of each entry
+    cache : if it holds the points of all entries, they are read from it; else the points are computed
     """
     if cache is None or sum(end - begin for begin, end in cache.filled) < len(cache.origin):
         return points_of(surface, valid_points, chosen, wanted[:, None])

@@ -1,7 +1,8 @@
 """Splits texels that another surface passes through, and groups texels into regions.
 
-For example, a floor continues under a wall, or a beam passes through it. A texel where the two surfaces meet
-has points on both sides of the other surface. A single value per texel would mix the light of both sides.
+For example, a floor continues under a wall, or a beam passes through a floor. A texel where the two surfaces
+meet has points on both sides of the other surface. A single value per texel would mix the light of both
+sides.
 
 Therefore the points of such a texel are grouped by mutual visibility (`radiosity.kernels.sides`). Each group,
 called a side, becomes a texel entry (a row of `TexelBuffer`). In general, the side with most points gets the
@@ -45,12 +46,12 @@ from baker.trace.packets import PacketBuffers
 # neighbouring entries (_PAIRS).
 _TILE = 4096
 _SUSPECTS, _PAIRS = 1024, 2048
-# Number of the point that the first test of two neighbours uses in each of them. The second test uses all
-# points.
+# The first visibility test of two neighbouring entries uses only point 0 of each entry. The second test uses
+# all points.
 _ONE = np.zeros((1, 1), np.uint8)
-# _MANY_BACKS: share of a side's rays that hit black backs, the backs of one-sided surfaces. Above it, the
-# side is treated as outside the model. _OUTSIDE: weight of the points of a side outside the model; other
-# points have weight 1.
+# _MANY_BACKS: limit of the share of a side's rays that hit black backs, the backs of one-sided surfaces.
+# Above this limit, the side is treated as outside the model. _OUTSIDE: weight of the points of a side outside
+# the model; other points have weight 1.
 _MANY_BACKS, _OUTSIDE = 0.25, 0.25
 _EVERY = np.arange(N_POINTS, dtype=np.uint8)[None]
 _BITS = np.uint32(1) << np.arange(N_POINTS, dtype=np.uint32)
@@ -449,7 +450,7 @@ def _order_sides(
     best = groups.entry(np.arange(len(groups.owner)), score.argmax(axis=1))
     order[groups.owner], order[best] = best, groups.owner
     number = np.unique(entry).astype(np.int32)
-    # `order` swaps two entries of a texel, so it also maps old numbers to new ones.
+    # `order` only swaps pairs of entries, so it also maps old numbers to new numbers.
     member = np.full(groups.label.shape, -1, np.int32)
     member[row, k] = np.searchsorted(number, order[entry])
     table = SideTable(groups.point, groups.normal, groups.height, member, entries.side[groups.owner])

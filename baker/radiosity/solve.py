@@ -39,18 +39,19 @@ from baker.radiosity.form_factors import FormFactorMatrix
 from baker.radiosity.kernels.conjugate_gradients import conjugate_step
 from baker.radiosity.kernels.form_factor import multiply, multiply_coloured
 
-# Relative error of a patch's exitance, estimated from its residual. Below it, the patch has converged.
+# Limit of the relative error of a patch's exitance, estimated from its residual. Below this limit, the patch
+# has converged.
 TOLERANCE = 3e-5
 # Largest total number of iterations of conjugate gradients.
 MAX_ITERATIONS = 1000
-# Number of stored matrix elements per thread. A further thread is used for each such number.
+# Number of stored matrix elements for which one more thread is used.
 _PART = 250_000
 # Lower limit of the exitance with which a patch's residual is compared, as a share of the largest source
 # exitance of the same colour. Because of this limit, nearly black patches do not delay the solve.
 _DARK = 1e-15
-# Ratio of the residual norm to its initial value. Below it, conjugate gradients are started again, because
-# the search directions have lost orthogonality, and the residual of the iteration differs from the true
-# residual.
+# Limit of the ratio of the residual norm to its initial value. Below this limit, conjugate gradients are
+# started again, because the search directions have lost orthogonality, and the residual of the iteration
+# differs from the true residual.
 _REDUCTION = 1e-12
 # Upper limit of albedo: with albedo 1, a closed scene has no solution.
 MAX_ALBEDO = 0.999
@@ -247,7 +248,8 @@ class _Goal:
     dark : (3,) float64, lx
     """
 
-    # Residual as a share of the allowed residual. If no patch exceeds it, conjugate gradients stop.
+    # Limit of the residual as a share of the allowed residual. If no patch exceeds this limit, conjugate
+    # gradients stop.
     MARGIN: ClassVar[float] = 0.5
     tolerance: NDArray[np.float64]
     dark: NDArray[np.float64]

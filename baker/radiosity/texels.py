@@ -1,4 +1,4 @@
-"""Texels of the atlas: the triangles in each texel, and the texel's position, normal and albedo."""
+"""Finds the texels of the atlas, the triangles in each texel, and the texel's position, normal and albedo."""
 
 from __future__ import annotations
 

@@ -17,12 +17,12 @@ from baker.core.scene import SceneWarning
 from baker.radiosity.form_factors import FormFactorMatrix
 from baker.radiosity.solve import MAX_ALBEDO, Solution, apply, solve_warnings
 
-# Albedo of a patch. Above it, the patch is tested.
+# Limit of the albedo of a patch. Above this limit, the patch is tested.
 NEARLY_WHITE = 0.98
 # Number n of reflections in the test.
 REFLECTIONS = 20
-# Ratio of all light to direct light. Above it, there is a warning. A closed scene of albedo 0.95 has this
-# ratio.
+# Limit of the ratio of all light to direct light. Above this limit, there is a warning. A closed scene of
+# albedo 0.95 has exactly this ratio.
 MOST_GAIN = 20.0
 
 

@@ -24,9 +24,10 @@ _BUFFER_INDEX, _BUFFER_VERTEX = 0, 1
 _FORMAT_UINT3, _FORMAT_FLOAT3 = 0x5003, 0x9003
 _PROPERTY_VERSION, _PROPERTY_RAY4, _PROPERTY_RAY8, _PROPERTY_RAY16 = 0, 32, 33, 34
 _SCENE_ROBUST = 1 << 2
-# Number of triangles of the scene. Up to it, packets are traced as coherent, because rays of neighbouring
-# texels usually hit the same triangles. The table shows the time of a final gather (one page of 512 x 512
-# texels, 64 rays per texel) with coherent packets, divided by the time with incoherent packets:
+# Limit of the number of triangles of the scene. Up to this limit, packets are traced as coherent, because
+# rays of neighbouring texels usually hit the same triangles. The table shows the time of a final gather (one
+# page of 512 x 512 texels, 64 rays per texel) with coherent packets, divided by the time with incoherent
+# packets:
 #
 #     triangles   36     446    986    2714   11,000        70,000
 #     time        0.79   0.81   0.77   0.74   0.93 to 1.2   1.35

@@ -4,9 +4,10 @@
     E = 1/n sum L cos / (p_light + (n_hemisphere / n) p_cosine)
 
 The sum is over the n shadow rays, with the radiance L of the emitter and the cosine at the texel. p are
-probability densities per steradian. The balance heuristic combines these light samples with n_hemisphere rays
-that hit the same emitters (`emitter_hit`). If no shadow ray of sixteen neighbouring texels is blocked and the
-emitters are few, untextured and opaque, the closed form of `radiosity.kernels.polygon_light` replaces both.
+probability densities per steradian. The balance heuristic combines these light samples with n_hemisphere
+cosine-weighted rays, some of which hit the same emitters (`emitter_hit`). If no shadow ray of sixteen
+neighbouring texels is blocked and the emitters are few, untextured and opaque, the closed form of
+`radiosity.kernels.polygon_light` replaces both estimates.
 
 Based on: Veach and Guibas, Optimally combining sampling techniques, 1995.
 """
@@ -44,10 +45,10 @@ _f = np.float32
 _INV_PI = np.float32(1.0 / math.pi)
 # TFAR of shadow rays, as a share of the distance to the emitter: the rays end before they hit the emitter.
 _SHORT = np.float32(0.9999)
-# Number of samples per texel and emitter. Below it, the closed form is not used.
+# Smallest number of samples per texel and emitter with which the closed form is used.
 _SAMPLES_PER_EMITTER = 8
-# Early out (see `light_samples`): smallest mean number of test rays per texel. With fewer test rays, texels
-# are not treated as unoccluded.
+# Smallest mean number of test rays per texel for the early out of `light_samples`. With fewer test rays,
+# texels are not treated as unoccluded.
 _MIN_TESTS = 8
 # Rows of `sampled`, the data of the emitter that each lane samples: corner 0, edges 1 and 2 and normal (3
 # each), probability density per m2, 1 if two-sided else 0, radiance (3).

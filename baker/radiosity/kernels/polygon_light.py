@@ -33,12 +33,13 @@ _f = np.float32
 #     _HEIGHT            heights of the triangle's three corners above the tangent plane (3)
 #     _SUM               sum over the edges of angle_i Gamma_i . n
 #     _SMALL             E / L of a triangle that is treated as a point, -1 for other triangles
-#     _FACING            1 if a side that emits faces the point, else 0
+#     _FACING            1 if the triangle emits from the side that faces the point, else 0
 _ORIGIN, _NORMAL, _ARM, _HEIGHT, _SUM, _SMALL, _FACING = 0, 3, 6, 18, 21, 22, 23
 _ROWS = 24
 _work, _corners = scratch((_ROWS * PACKET_WIDTH,), _f), scratch((15,), _f)
-# (longest edge / distance)^2 of a triangle. Below it, the triangle is treated as a point at its centroid,
-# because the sum over edges would lose digits. The relative error of this approximation is about 1e-5.
+# Limit of (longest edge / distance)^2 of a triangle. Below this limit, the triangle is treated as a point at
+# its centroid, because rounding errors in float32 would dominate the sum over edges. The relative error of
+# this approximation is about 1e-5.
 _SMALL_VIEW = np.float32(1.0e-4)
 
 
@@ -122,8 +123,8 @@ def _load_triangle(work, row, m, lanes):
     work : (24 * 16,) float32, see the row names; row : (M, 24) float32, see `kernels.emitters.Emitters`
     Returns the largest number of corners of any lane, 3 or 4; 0 if the triangle lights no lane's point.
     """
-    # Load the corners. The values are arguments and j is a constant, so that the compiler vectorises the
-    # loops over lanes.
+    # Load the corners. Each coordinate is passed as a number, and the number of the corner as a constant.
+    # Therefore the compiler vectorises the loop over lanes in `_load_corner`.
     _load_corner(work, 0, row[m, CORNER], row[m, CORNER + 1], row[m, CORNER + 2])
     _load_corner(work, 1, row[m, CORNER_1], row[m, CORNER_1 + 1], row[m, CORNER_1 + 2])
     _load_corner(work, 2, row[m, CORNER_2], row[m, CORNER_2 + 1], row[m, CORNER_2 + 2])

@@ -55,7 +55,8 @@ _INV_2_32 = 1.0 / 4294967296.0
 # Indices in the user data of the filter, which contains address and length of each array.
 _ALPHA_SLOT, _ALPHA_ROW, _PIXELS, _CODED, _LEVEL, _N_LEVELS, _WRAP, _BLEND_SLOT, _BLEND_ROW = range(0, 18, 2)
 _U, _V, _PRIM = HIT_U - NG_X, HIT_V - NG_X, PRIM_ID - NG_X
-# Transmittance (largest of R, G and B) along a shadow ray. Below it, the ray is treated as blocked.
+# Limit of the transmittance (largest of R, G and B) along a shadow ray. Below this limit, the ray is treated
+# as blocked.
 _DARK = np.float32(1.0e-9)
 _rgba, _rgb = scratch((4,), np.float64), scratch((3,), np.float64)
 

@@ -17,11 +17,12 @@ import numpy as np
 from baker.trace.jit import inner
 from baker.trace.packets import BLEND_EDGE_HITS, BLEND_EDGES, EDGE_HITS
 
-# Smallest barycentric coordinate of a hit. Up to it, the hit is treated as lying on an edge. Embree accepts
-# coordinates down to -1.2e-7, so a ray hits both triangles at an edge only within 1.2e-7 of the edge.
+# Limit of the smallest barycentric coordinate of a hit. Up to this limit, the hit is treated as lying on an
+# edge. Embree accepts coordinates down to -1.2e-7, so a ray hits both triangles at an edge only within 1.2e-7
+# of the edge.
 EDGE = 1.0e-6
-# Relative difference of the distances of two hits. Up to it, the hits are the same crossing: rounding causes
-# the difference.
+# Limit of the relative difference of the distances of two hits. Up to this limit, the hits are treated as the
+# same crossing, because rounding may cause such a difference.
 SAME = np.float32(4.0e-6)
 
 
