@@ -92,8 +92,7 @@ class Channel(ChannelDescription):
     layers: Callable[[Transport], tuple[Layer, ...]]
 
     def __post_init__(self) -> None:
-        """Raise ValueError if `signed` contradicts `lower`: a channel is signed if and only if `lower` is
-        negative."""
+        """Raise ValueError if `signed` is true and `lower` is not negative, or the other way round."""
         if self.signed != (self.lower < 0.0):
             raise ValueError("a channel is signed if and only if its lower bound is negative")
 

@@ -76,7 +76,7 @@ class DiffReport(Result):
     differences : list of dict
         Settings and other manifest entries that differ, in the form of `to_dict`.
     only_in_a, only_in_b : list of dict
-        Name and node of the objects that have no counterpart in the other bake.
+        Name and node of the objects whose surface is missing in the other bake, see `baker.comparison.match`.
     unmatched : int
         Number of points of bake a without a matching point in bake b, except points on the objects
         `only_in_a`.

@@ -1,4 +1,4 @@
-"""Differences between the manifests of two bakes."""
+"""Lists the differences between the manifests of two bakes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from baker.io.bake.read_bake import StoredBake
 def manifest_differences(a: StoredBake, b: StoredBake, pairs: ObjectPairs) -> list[dict[str, Any]]:
     """Return the differing entries of two manifests, as dictionaries with the keys `what`, `a` and `b`.
 
-    Compared are the settings, input, versions, lights, pages, channels and matrices of paired objects.
+    The settings, input, versions, lights, pages and channels are compared, and the matrices of paired
+    objects.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
 """Finds the points on the surface of bake b that match given points on the surface of bake a.
 
-`baker.comparison.pairs` pairs the objects of both bakes. If the two objects of a pair have the same mesh, the
-matching point has the same triangle and the same barycentric weights. A bake then differs from itself by
-exactly 0, and an object that was moved is compared with itself. If the meshes differ, the nearest point of b
-is searched along the normal. It must be within a small distance in world space, on a face with a similar
-normal.
+`baker.comparison.pairs` pairs the objects of both bakes. If the two objects of a pair have equal meshes, the
+matching point is in the triangle with the same number and has the same barycentric weights. So the difference
+of a bake from itself is exactly 0, and objects that were moved between the bakes are still compared. If the
+meshes differ, the nearest point of b is searched along the normal. It must be within a small distance in
+world space, on a face with a similar normal.
 """
 
 from __future__ import annotations
@@ -30,8 +30,9 @@ _LIFT = 0.01
 _ALIKE = 0.5
 # Largest number of hits that are tested along a ray.
 _LAYERS = 4
-# Share of the area of an object without a partner. If at least this share matches objects without a partner
-# in the other bake, the object is not reported as missing there.
+# Limit of the share of an object's area that has matching points in the other bake. Only objects without a
+# partner (`baker.comparison.pairs`) are tested, and only against such objects of the other bake. Below this
+# limit, the object is reported as missing in the other bake.
 _PRESENT = 0.5
 
 
@@ -68,11 +69,11 @@ class ComparedSurfaces:
     ----------
     a, b : Geometry
     mirrored_a, mirrored_b : (I,) bool
-        Instances under a mirroring transform. The corners of their triangles are in the reverse of the order
-        in the mesh.
+        Instances whose transform mirrors the mesh. The corners of their triangles have the reverse order of
+        the corners in the mesh.
     pairs : ObjectPairs
     missing_a, missing_b : (I,) bool
-        Instances without a counterpart in the other bake.
+        Instances whose surface is missing in the other bake, see `_PRESENT`.
     """
 
     a: Geometry
@@ -158,11 +159,12 @@ def _missing(
     other: Geometry,
     other_rest: NDArray[np.int64],
 ) -> NDArray[np.bool_]:
-    """Return (I,) bool: the instances of `rest` that have no counterpart among `other_rest`.
+    """Return (I,) bool: the instances of `rest` whose surface is missing among `other_rest`.
 
-    `rest` and `other_rest` are the instances without a partner of `geometry` and of `other`. An instance has
-    a counterpart if at least the share `_PRESENT` of its area matches. The area of a triangle matches if its
-    centroid matches.
+    `rest` contains the instances of `geometry` without a partner, and `other_rest` the instances of `other`
+    without a partner. The surface of an instance is missing if less than the share `_PRESENT` of its area has
+    matching points on `other_rest`. The centroid of each triangle is tested, and represents the area of the
+    triangle.
     """
     missing = np.zeros(n_instances, bool)
     missing[rest] = True

@@ -8,8 +8,8 @@ objects if they have the same key, and no other unpaired object of either scene 
     2    | name           |
     3    | node           | the meshes are equal (the object was renamed)
 
-Objects that remain unpaired may have been joined or split. Points on them are therefore matched with all
-unpaired objects of the other scene.
+Objects that remain unpaired may have been joined or split. Points on unpaired objects are therefore matched
+with all unpaired objects of the other scene.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""FLIP error of the pages of bake a against the values of bake b at the same surface points."""
+"""Computes the FLIP error of the pages of bake a against the values of bake b at the same surface points."""
 
 from __future__ import annotations
 

@@ -16,7 +16,10 @@ class DiffSettings(Settings):
     texels: int = setting(20000, "Number of texels of A to compare.", ge=1)
     flip: bool = setting(True, "Also compute the FLIP error of the pages.")
     fail_if: str | None = setting(
-        None, 'Limits that fail if they are true: "irradiance.p95 > 0.05, ao.flip > 0.02".', metavar="EXPR"
+        None,
+        'Conditions for failure, separated by commas: "irradiance.p95 > 0.05, ao.flip > 0.02". '
+        "Default: none.",
+        metavar="EXPR",
     )
     seed: int = seed_setting()
     threads: int | None = threads_setting()

@@ -15,8 +15,8 @@ of direct light, with noisy indirect light:
     10 and 20 %                           | all           | 4.0 %             | 3.0 %
     10 and 20 %                           | at the edge   | 7.7 %             | 4.8 %
 
-*Measured* on the outermost ring of texels of charts, with 20 % noise and contact shadows, by the values with
-which empty texels are filled:
+*Measured* errors in the outermost ring of texels of charts, with 20 % noise and contact shadows. Each row is
+one choice of the values with which empty texels are filled:
 
     content of empty texels               | RMS error | mean error
     black                                 |           | -16 %
@@ -63,9 +63,10 @@ __all__ = ["denoise_page", "denoiser_name", "surround_charts"]
 # radius of the filter (its tile overlap).
 REACH = 96
 # MARGIN: smallest number of mirrored texels at each side of the image. BLOCK: the sides of the extended image
-# are multiples of it. The filter shifts the colour of the outermost texels, and shifts it more if it pads its
-# blocks of 16 itself. On grey pages of 225 to 240 texels a side with 5 % noise, the RMS error of the
-# outermost 8 texels was 0.37 to 0.38 % with these values, and 0.36 to 0.41 % with a fixed margin of 16.
+# are multiples of BLOCK. The filter shifts the colour of the outermost texels. The shift is larger if the
+# filter itself pads the image to blocks of 16. On grey pages of 225 to 240 texels a side with 5 % noise, the
+# RMS error of the outermost 8 texels was 0.37 to 0.38 % with these values, and 0.36 to 0.41 % with a fixed
+# margin of 16.
 MARGIN, BLOCK = 8, 16
 # Half side of the window to which planes are fitted at chart borders, texels.
 SLOPE_RADIUS = 4
@@ -75,8 +76,8 @@ _BORDER_TEXELS = 4096
 # the page. Larger bounds are scaled down to this ratio. The true error of AO is 0.95 to 1.2 times the
 # estimated noise (scenes Cornell, interior and hall; 16 to 256 rays).
 FITTED = 1.2
-# Largest ratio of a chart's mean luminance to the page's median, or of the median to the mean. Beyond it, the
-# chart is scaled to the median before filtering.
+# Limit of the ratio of a chart's mean luminance to the page's median, and of the ratio of the median to the
+# mean. Above this limit, the chart is scaled to the median before filtering.
 LEVEL = 8.0
 LUMINANCE = np.array(LUMINANCE_WEIGHTS, np.float32)
 
@@ -205,7 +206,7 @@ def _margins(side: int) -> tuple[int, int]:
 def _levels(
     value: NDArray[np.float32], chart: NDArray[np.int32], covered: NDArray[np.bool_]
 ) -> NDArray[np.float32]:
-    """Return (H, W, 1) float32: the divisor of each texel's value, 1 if its chart is within `LEVEL`.
+    """Return (H, W, 1) float32: the divisor of each texel's value; 1 in charts that are not scaled (`LEVEL`).
 
     value : (H, W, 3) float32; chart : (H, W) int32; covered : (H, W) bool
     """

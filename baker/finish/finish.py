@@ -21,25 +21,25 @@ from baker.finish.oidn import LightmapDenoiser
 from baker.finish.packing import pack_charts
 from baker.finish.texel_centre import recentre
 
-# RMS relative noise of a brightness band, see `BAND`. Up to it, the texels of the band are not denoised,
-# because the filter hardly reduces such small errors. In the scene Cornell with 64 samples, the median error
-# was 0.33 % with the filter and 0.35 % without.
+# Limit of the RMS relative noise of a brightness band, see `BAND`. Up to this limit, the texels of the band
+# are not denoised, because the filter hardly reduces such small errors. In the scene Cornell with 64 samples,
+# the median error was 0.33 % with the filter and 0.35 % without.
 NOT_WORTH_FILTERING = 0.02
 # BAND: width of a brightness band, the ratio of the largest to the smallest mean light of its charts or
 # blocks.
-# FEWEST: number of texels of a band. Below it, the band is not denoised.
+# FEWEST: smallest number of texels of a band that is denoised.
 BAND = 8.0
 FEWEST = 64
-# Ratio of the arithmetic to the geometric mean of a chart's light. Above it, the chart is split into blocks,
-# and each block is assigned to a brightness band separately.
+# Limit of the ratio of the arithmetic to the geometric mean of a chart's light. Above this limit, the chart
+# is split into blocks, and each block is assigned to a brightness band separately.
 UNEVEN = 2.5
-# Mean light of a chart or block, as a share of the mean light of the brightest one. Darker means are raised
-# to it.
+# Smallest mean light of a chart or block, as a share of the mean light of the brightest chart or block.
+# Smaller means are replaced by this value.
 BLACK = 1e-10
-# RMS relative noise of a chart. Up to it, the chart is not denoised.
+# Limit of the RMS relative noise of a chart. Up to this limit, the chart is not denoised.
 QUIET = 0.002
-# Number of texels of the packed page divided by the number of covered texels of the page. Above it, charts
-# are not packed for the filter.
+# Limit of the number of texels of the packed page divided by the number of covered texels of the page. Above
+# this limit, charts are not packed for the filter.
 SMALLER = 0.9
 # Side of a block of an uneven chart, texels.
 BLOCK = 16

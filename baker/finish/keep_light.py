@@ -2,10 +2,10 @@
 
 If few rays hit the light, most texels are too dark, and a few are far too bright. The filter removes these
 bright texels as outliers, so surfaces with much noise become too dark. The sum of the samples over many
-texels is unbiased. Its variance between seeds equals the variance of the sum of the filtered values.
-Therefore, in windows of 40 x 40 texels, the filtered values are scaled so that their sum approaches the sum
-of the samples. The correction is smaller in windows with few texels of the chart, because their sums are
-noisy.
+texels is unbiased. The variance of this sum between seeds equals the variance of the sum of the filtered
+values. Therefore, in windows of 40 x 40 texels, the filtered values are scaled so that their sum approaches
+the sum of the samples. The correction is smaller in windows with few texels of the chart, because the sums
+over such windows are noisy.
 
 *Measured* differences between the mean of the filtered values and the mean of the samples: in a cellar behind
 one small window (64 and 256 rays, 5 seeds), -2.6 to -3.9 % without this correction, and -0.3 to -2.1 % with

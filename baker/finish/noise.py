@@ -14,8 +14,8 @@ from baker.finish.tiles import over_rows
 
 # Side of a block, texels.
 BLOCK = 16
-# Number of filtered texels. Below it, the median of a block is replaced by the median of the chart, and the
-# median of a chart by the median of the page.
+# Smallest number of filtered texels from which a median is computed. With fewer texels, the median of a block
+# is replaced by the median of the chart, and the median of a chart by the median of the page.
 FEWEST = 12
 # Median of |x| of a standard normal variable.
 NORMAL_MEDIAN = 0.6744898

@@ -18,8 +18,8 @@ from baker.trace.jit import inner, larger, smaller
 
 # Largest number of mip levels of a texture.
 MAX_LEVELS = 16
-# Columns of `TexturePack.level`, columns of `TexturePack.wrap`, and the alpha column of pixels, in this
-# order.
+# OFFSET to HEIGHT: columns of `TexturePack.level`. WRAP_U to STORAGE: columns of `TexturePack.wrap`. ALPHA:
+# column of `TexturePack.pixels` and `.coded`.
 OFFSET, WIDTH, HEIGHT = 0, 1, 2
 WRAP_U, WRAP_V, NEAREST, STORAGE = 0, 1, 2, 3
 ALPHA = 3

@@ -1,4 +1,4 @@
-"""Share of dilated texels whose values differ strongly from their covered neighbours."""
+"""Computes the share of dilated texels whose values differ strongly from their covered neighbours."""
 
 from __future__ import annotations
 

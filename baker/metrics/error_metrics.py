@@ -1,4 +1,4 @@
-"""Error metrics of a set of values against reference values.
+"""Computes error metrics of a set of values against reference values.
 
 v_c and r_c are the value and the reference value of colour c at a point, and v and r their means over
 colours. Means and medians are over all points, unless stated otherwise:
@@ -22,8 +22,8 @@ swapped. `colour_bias` is mean(v_c - r_c) / mean(r_c) of the colour where this r
 denominator is at least a tenth of mean(r).
 
 `noise_floor` and `noise_p95` are the median and the 95th percentile of the relative error that the noise of
-the reference causes. The reference is the mean of two independent halves. Its noise is estimated as half the
-difference of the halves, which has the same variance.
+the reference causes. The reference is the mean of two independent halves. The noise of this mean is estimated
+as half the difference of the halves, because both have the same variance.
 
 `energy_ratio` is the ratio R of the total light of the bake to that of the reference. It detects gain or loss
 of energy, as a furnace test does. The points are weighted by area, unlike in `bias`, because small objects

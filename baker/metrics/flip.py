@@ -1,4 +1,4 @@
-"""The FLIP error: the perceived difference between two pictures that are shown in alternation.
+"""Computes the FLIP error: the perceived difference between two pictures that are shown in alternation.
 
 Based on: Andersson et al., FLIP: A difference evaluator for alternating images, 2020; Andersson et al.,
 Visualizing errors in rendered high dynamic range images, 2021 (HDR-FLIP).

@@ -1,4 +1,4 @@
-"""Deviations of a group of points from the reference, with standard errors.
+"""Computes the deviations of a group of points from the reference, with standard errors.
 
 A group is the set of points of an object, a chart or another region. Its deviations are ratios of sums over
 the group. The value of a single point is known to a few percent, and the mean of a hundred points ten times

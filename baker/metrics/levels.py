@@ -9,8 +9,8 @@ from baker.metrics.groups import ComparedPoints
 
 # Smallest number of distinct levels, and of texels per level, for which a map is tested.
 _MIN_LEVELS, _TEXELS_PER_LEVEL = 16, 8
-# Levels count as evenly spaced if the median of |log(d2 / d1)| is below this, where d1 and d2 are successive
-# differences of sorted levels. For random values the median is about 1.1.
+# Limit of the median of |log(d2 / d1)|, where d1 and d2 are successive differences of sorted levels. Below
+# this limit, the levels count as evenly spaced. For random values the median is about 1.1.
 _EVEN = 0.2
 # Quantised levels are spaced more coarsely than half floats by at least this factor.
 _COARSE = 4.0

@@ -1,4 +1,4 @@
-"""Random choice of the texels that are compared, stratified by object and brightness."""
+"""Chooses random texels to compare, stratified by object and brightness."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def scarce_texels(
     n: int,
     seed: int,
 ) -> NDArray[np.int64]:
-    """Choose additional texels so that n texels of each light level are chosen, or all if there are fewer.
+    """Choose additional texels so that n texels of each light level are chosen, or all if it has fewer.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The own error of values: their relative spread about the truth, without the noise of the reference.
+"""Computes the own error of values: their relative spread about the truth, without the reference's noise.
 
 A group has n points with values v, reference values r, and standard errors s of the reference. Let
 c = max((v + r) / 2, floor), and let a be the median of (v - r) / c, weighted by 1 / max(s / c, 0.02). The own

@@ -18,10 +18,10 @@ from baker.metrics.kernels.texel_pieces import spread_pieces, texel_owners, texe
 
 # Share of a texel's square that an instance must cover to own the texel.
 _MIN_AREA = 1.0e-3
-# Share of a texel's square above which it counts as completely covered.
+# Share of a texel's square that surface covers. Above this share, the texel counts as completely covered.
 _WHOLE = 0.98
-# Cosine of the angle between a vertex normal and the face normal. Below it, the vertex lies at a hard edge,
-# and its tangent plane is not used in `lift`.
+# Limit of the cosine of the angle between a vertex normal and the face normal. Below this limit, the vertex
+# lies at a hard edge, and its tangent plane is not used in `lift`.
 _HARD_EDGE = 0.7
 
 

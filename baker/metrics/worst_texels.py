@@ -1,4 +1,4 @@
-"""The texels with the largest significant errors."""
+"""Finds the compared texels with the largest significant errors."""
 
 from __future__ import annotations
 

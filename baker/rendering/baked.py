@@ -1,4 +1,4 @@
-"""Radiance of surfaces lit by a bake, with bilinear lookups of the lightmaps as in engines."""
+"""Computes the radiance of surfaces lit by a bake, with bilinear lookups of the lightmaps as in engines."""
 
 from __future__ import annotations
 

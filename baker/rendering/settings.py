@@ -50,7 +50,8 @@ class RenderSettings(Settings):
     )
     max_depth: int | None = setting(
         None,
-        "Largest number of vertices of a path after the camera; 1 is direct light only. Default: no limit.",
+        "Largest number of surface points that reflect light on a path; 1 is direct light only. "
+        "Default: no limit.",
         ge=1,
     )
     ao: bool = setting(False, "Render ambient occlusion.")
@@ -64,7 +65,8 @@ class RenderSettings(Settings):
     denoise: bool = setting(False, "Run Open Image Denoise over the picture.")
     lightmap: Path | None = setting(
         None,
-        "Output folder of a bake: render its scene, lit by its lightmaps instead of path tracing.",
+        "Output folder of a bake. Its scene is rendered in place of `scene`, lit by its lightmaps, without "
+        "path tracing.",
         metavar="OUT",
     )
     sky: Numbers | None = setting(

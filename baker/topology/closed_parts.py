@@ -15,23 +15,24 @@ from numpy.typing import NDArray
 from baker.topology.edges import Edges, find_edges
 from baker.topology.weld import connected, number_by_first, number_rows
 
-# Area of a part's holes divided by the area of its triangles. Up to it, the part is closed.
+# Limit of the area of a part's holes divided by the area of its triangles. Up to this limit, the part is
+# closed.
 SMALL_HOLES = 0.005
-# Area of a part's holes divided by the area of its triangles. Up to it, the part is watertight. It is above 0
-# to allow slits without width, where one edge meets two shorter edges.
+# Limit of the same ratio. Up to this limit, the part is watertight. The limit is above 0 to allow slits
+# without width, where one edge meets two shorter edges.
 NO_HOLES = 1e-6
-# Volume of a part, divided by its area and by the largest distance of a vertex from the part's centre. Up to
-# it, the part is treated as enclosing no space. Offsets of ray origins, relative to the size of a surface,
-# are about as large.
+# Limit of the volume of a part, divided by its area and by the largest distance of a vertex from the part's
+# centre. Up to this limit, the part is treated as enclosing no space, because it is about as thin as the
+# offsets of ray origins.
 THINNEST = 1e-5
-# Largest distance of a boundary loop from its plane, divided by the square root of the loop's area. Up to it,
-# the loop is flat. A part without a lid has a single boundary loop, which is flat.
+# Limit of the largest distance of a boundary loop from its plane, divided by the square root of the loop's
+# area. Up to this limit, the loop is flat. A part without a lid has a single boundary loop, which is flat.
 _FLAT = 0.1
-# Area of the missing lid divided by the area of the part. Above it, the part is a sheet, not a part without a
-# lid.
+# Limit of the area of the missing lid divided by the area of the part. Above this limit, the part is a sheet,
+# not a part without a lid.
 _WIDEST_LID = 0.9
-# Distance of two vertices of different objects along each axis, divided by the largest coordinate of all
-# vertices. Up to it, the vertices coincide.
+# Limit of the distance of two vertices of different objects along each axis, divided by the largest
+# coordinate of all vertices. Up to this limit, the vertices coincide.
 _TOGETHER = 4e-7
 
 
@@ -393,7 +394,7 @@ def _near_alike(point: NDArray[np.float64], step: float) -> NDArray[np.int64]:
 def _enclosing(pieces: _Pieces, corner: NDArray[np.float64]) -> NDArray[np.int8]:
     """Return (F,) int8: 1 if a face's normal points out of the space that its piece encloses, -1 if into it.
 
-    It is 0 for pieces that enclose no space.
+    The value is 0 for faces of pieces that enclose no space.
 
     corner : (F, 3, 3) float64, positions of the corners, metres
     """

@@ -1,4 +1,4 @@
-"""Edges of a triangle mesh: the faces that meet at each edge, and their directions along it."""
+"""Finds the edges of a triangle mesh, the faces at each edge, and the directions of the faces along it."""
 
 from __future__ import annotations
 

@@ -47,14 +47,15 @@ _WITNESSES = 8
 # Winding numbers of a point. Above _INSIDE, the point is inside a closed part. Above _WITHOUT_LID, it is
 # inside a part without a lid. Below _OUTSIDE, it is outside of either.
 _INSIDE, _WITHOUT_LID, _OUTSIDE = 0.75, 0.5, 0.25
-# Area of the parts inside a part, as a share of the area of all other parts. Above it, the part is a room.
+# Limit of the area of the parts inside a part, as a share of the area of all other parts. Above this limit,
+# the part is a room.
 _MOST_OF_SCENE = 0.5
 # _LARGEST: number of parts, those with the largest bounding boxes, that are tested for containing most of the
 # scene.
 # _HELD: number of parts within such a box that are tested for being inside.
 _LARGEST, _HELD = 32, 64
-# Number of faces of a part times number of parts that are tested for being inside it: upper limit, which
-# bounds the time. At least _HELD parts are tested.
+# Upper limit of the number of faces of a part times the number of parts that are tested for being inside this
+# part. It bounds the time. At least _HELD parts are tested.
 _MOST_WORK = 200_000_000
 
 

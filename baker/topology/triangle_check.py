@@ -9,8 +9,9 @@ from baker.topology.unique_rows import mix, unique_rows
 
 # Largest absolute coordinate of a usable vertex. The limit of Embree is 1.8e18.
 LARGEST_COORDINATE = 1e18
-# Height of a triangle divided by its longest edge. Up to it, the triangle is treated as having no area. It is
-# about the relative spacing of float32 numbers, so the plane of such a triangle is undefined.
+# Limit of the height of a triangle divided by its longest edge. Up to this limit, the triangle is treated as
+# having no area. The limit is about the relative spacing of float32 numbers, so the plane of such a triangle
+# is undefined.
 _FLATTEST = 1e-7
 
 
@@ -117,9 +118,9 @@ def duplicates(
 ) -> NDArray[np.bool_]:
     """Return which triangles are duplicates of an earlier triangle, by position.
 
-    A triangle is a duplicate if an earlier triangle has the same three corner positions and the same winding;
-    they may start at different corners. If an earlier triangle has the same positions and the opposite
-    winding, the triangle is a duplicate only if both have the same material and this material is
+    A triangle is a duplicate if an earlier triangle has the same three corner positions and the same winding.
+    The two triangles may start at different corners. If an earlier triangle has the same positions and the
+    opposite winding, the triangle is a duplicate only if both have the same material and this material is
     double-sided.
 
     Parameters

@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-# Number of faces of a surface. Above it, `Enclosure` does not sum solid angles, because this would take too
-# long.
+# Limit of the number of faces of a surface. Above this limit, `Enclosure` does not sum solid angles, because
+# this would take too long.
 MANY = 4096
 # An approximate rotation matrix. `Enclosure` casts lines along its third row, which is parallel to no
 # direction that is usual in models, so that lines rarely hit edges and vertices.

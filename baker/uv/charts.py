@@ -63,7 +63,7 @@ class _Welded:
     triangle : (T, 3) int32
         Vertex indices of each triangle.
     part : (T,) int32
-        Part of each triangle, see `cut_parts`.
+        Part of each triangle, see `uv.parts.cut_parts`.
     """
 
     position: NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Overlap and area of uv layouts, and the tolerances of a valid lightmap uv."""
+"""Computes overlap and area of uv layouts, and defines the tolerances of a valid lightmap uv."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 # Distance, in uv, by which a valid lightmap uv may exceed the range 0 to 1. It allows for rounding in
 # exporters.
 RANGE_SLACK = 1e-4
-# Largest share of a mesh's surface without area in uv. Above it, the lightmap uv is not valid.
+# Limit of the share of a mesh's surface that has no area in uv. Above this limit, the lightmap uv is not
+# valid.
 MOST_LOST = 0.01
 # Share of samples that may be covered twice: of an object in a page (PAGE_TOLERANCE), and of a chart
 # (CHART_TOLERANCE). They are not 0, because rounding may make borders cross.
 PAGE_TOLERANCE = 1e-3
 CHART_TOLERANCE = 0.01
-# Distance of a sample from an edge, in units of the sample spacing. Up to it, the sample is inside neither of
-# the triangles at the edge.
+# Limit of the distance of a sample from an edge, in units of the sample spacing. Up to this limit, the sample
+# is inside neither of the triangles at the edge.
 EDGE_SLACK = 0.05
 
 

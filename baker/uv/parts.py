@@ -9,8 +9,9 @@ from baker.topology.weld import connected_faces, connected_vertices
 
 # Largest number of triangles of a block, and of a job that bundles several parts. Larger blocks are halved.
 JOB_TRIANGLES = 20_000
-# Number of triangles of a connected part. Above it, the part is cut into blocks. The time of xatlas grows
-# faster than linearly with the size of a part, and xatlas crashed on a part of 328,000 triangles.
+# Limit of the number of triangles of a connected part. Above this limit, the part is cut into blocks. The
+# time of xatlas grows faster than linearly with the size of a part, and xatlas crashed on a part of 328,000
+# triangles.
 SPLIT_TRIANGLES = 40_000
 # xatlas treats neighbours as one plane if their normals differ by less than about 2.5 degrees. It joins them
 # transitively, so that a finely tessellated sphere becomes one "planar" chart. SMOOTH_DOT is about the cosine

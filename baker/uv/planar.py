@@ -1,4 +1,4 @@
-"""Planar charts for triangles that xatlas left out, or whose chart overlapped itself.
+"""Makes planar charts for triangles that xatlas left out, or whose chart overlapped itself.
 
 Connected faces whose normals have the same largest component, with the same sign, are projected to a plane.
 If the projection distorts a triangle strongly, the triangle becomes a separate chart. If a projected chart

@@ -18,8 +18,8 @@ from baker.core.stage import Stage
 from baker.uv.worker import receive_charts, send_job
 from baker.uv.xatlas_charts import ChartJob, FlatCharts, cut_charts
 
-# Number of triangles of all jobs. Below it, the jobs run in this process, because starting a worker process
-# takes 0.2 s, which is longer than cutting the triangles.
+# Limit of the number of triangles of all jobs. Below this limit, the jobs run in this process, because
+# starting a worker process takes 0.2 s, which is longer than cutting the triangles.
 IN_PROCESS_TRIANGLES = 3000
 # Largest time, seconds, between the end of a worker's pipe and the end of the worker process.
 _MOMENT = 1.0

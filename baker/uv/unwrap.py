@@ -21,8 +21,8 @@ from baker.uv.keep import choose_kept, close_charts, kept_charts, lightmap_uv
 from baker.uv.outlines import CutInstance, RigidInstance, make_outlines, place_uv
 from baker.uv.pages import fill_pages
 
-# Relative difference between the scales of an instance along different axes. Up to it, the scale is treated
-# as uniform.
+# Limit of the relative difference between the scales of an instance along different axes. Up to this limit,
+# the scale is treated as uniform.
 _EVEN_SCALE = 1e-4
 # Fraction of the stage "unwrap" at which cutting ends and packing starts.
 _CUT_UNTIL = 0.7

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from baker.topology.weld import connected_vertices, number_by_first
 
-# Limit of a chart's area, as a multiple of the mean triangle area of its part. Small charts save time: with
-# limits that gave 14, 46 and 123 charts, cutting a mesh of 82,000 triangles took 54 s, 3.6 s and 1.2 s.
+# Limit of a chart's area, as a multiple of the mean triangle area of its part (`uv.parts.cut_parts`). Small
+# charts save time: with limits that gave 14, 46 and 123 charts, cutting a mesh of 82,000 triangles took 54 s,
+# 3.6 s and 1.2 s.
 CHART_FACES = 700
 
 
@@ -74,8 +75,9 @@ def cut_charts(job: ChartJob, chart_faces: int = CHART_FACES) -> FlatCharts:
     Returns
     -------
     FlatCharts
-        Charts, numbered over the whole job. Triangles that xatlas considers degenerate, and triangles of
-        charts that fold or lose area, have chart -1.
+        Charts, numbered over the whole job. Triangles that xatlas considers degenerate have chart -1. If more
+        than a thousandth of a chart's area is flipped in uv or has almost no area in uv, all triangles of the
+        chart have chart -1, too.
     """
     part = np.repeat(np.arange(job.n_parts), np.diff(job.first_triangle))
     corner = job.position[job.triangle.astype(np.int64) + job.first_vertex[part][:, None]]
@@ -184,7 +186,7 @@ def _true_to_size(
 def _drop_flat(
     uv: NDArray[np.float64], area: NDArray[np.float64], chart: NDArray[np.int32]
 ) -> NDArray[np.int32]:
-    """Return renumbered charts (T,) int32, with -1 for triangles of charts that fold or lose area.
+    """Return renumbered charts (T,) int32: -1 for charts with faces that are flipped or without area in uv.
 
     uv : (T, 3, 2), corners; area : (T,), areas of the triangles in space; chart : (T,)
     """

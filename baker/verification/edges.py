@@ -1,10 +1,10 @@
 """Chooses points at chart borders, next to walls and between texels, where bilinear lookups are compared.
 
 An engine looks up the map bilinearly at arbitrary points of the surface. The lookup reads four texels, which
-may be covered, filled or dilated; they are called the footprint. The reference of a lookup is the mean light
-at points inside these four texels. The points in a texel together have the weight of the texel in the lookup.
-Only points of the same surface that are visible from the looked-up point are used. Otherwise, a lookup next
-to a wall would be compared with light on the other side of the wall.
+are called the footprint. Each of the four may be covered, filled or dilated. The reference of a lookup is the
+mean light at points inside these four texels. The points in a texel together have the weight of the texel in
+the lookup. Only points of the same surface that are visible from the looked-up point are used. Otherwise, a
+lookup next to a wall would be compared with light on the other side of the wall.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _MAX_TEXELS, _MIN_COSINE = 4.0, 0.5
 
 @dataclass(frozen=True)
 class EdgePoints:
-    """n looked-up points. The mean light at k points around each of them is the reference of its lookup.
+    """n looked-up points. The mean light at k points around a looked-up point is the reference of the lookup.
 
     Attributes
     ----------
@@ -229,7 +229,7 @@ def _taps(point: _Points, size: int) -> tuple[NDArray[np.int64], NDArray[np.floa
 
 
 def _draw(weight: NDArray[np.float64], n: int, seed: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Draw n columns of each row of `weight` with probabilities proportional to it.
+    """Draw n columns of each row of `weight` with probabilities proportional to the weights in the row.
 
     weight : (m, k) float64
 

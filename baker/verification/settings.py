@@ -17,7 +17,10 @@ class VerifySettings(Settings):
     what: ClassVar[str] = "verify setting"
 
     texels: int = setting(
-        2000, "Number of random texels to compare; points at edges and outliers are added.", ge=1
+        2000,
+        "Number of random texels to compare. Points at edges are added. Texels that differ from all their "
+        "neighbours, that have large gradients or that have rare light levels are added, too.",
+        ge=1,
     )
     spp: int | None = setting(None, "Fixed number of paths for each texel.", ge=1)
     target_se: float = setting(0.005, "Relative standard error at which path tracing of a texel stops.", gt=0)
@@ -29,7 +32,10 @@ class VerifySettings(Settings):
         gt=0,
     )
     fail_if: str | None = setting(
-        None, 'Limits that fail if they are true: "irradiance.p95 > 0.05, ao.rmse > 0.02".', metavar="EXPR"
+        None,
+        'Conditions for failure, separated by commas: "irradiance.p95 > 0.05, ao.rmse > 0.02". '
+        "Default: the limits of `baker` for each channel.",
+        metavar="EXPR",
     )
     seed: int = seed_setting()
     threads: int | None = threads_setting()

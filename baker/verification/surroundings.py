@@ -1,8 +1,8 @@
-"""Finds which compared points are inside geometry or in narrow gaps, and groups the others in rooms.
+"""Finds which compared points are inside geometry or in narrow gaps, and groups the other points in rooms.
 
 `baker.pathtracer.inside_geometry` finds the points inside geometry. A texel is in a narrow gap if more than
-half of the rays from its points end within two texels. Texels cannot resolve the light there, so texels in
-gaps are only used for the metrics over all texels.
+half of the rays from its points end within two texels. Texels cannot resolve the light in gaps, so texels in
+gaps are used only for the metrics over all texels.
 
 A room is a set of points that are visible from one point in the air. Points in the air are midpoints of rays
 between surfaces. The point in the air from which most points are visible defines the first room. The point
@@ -24,7 +24,7 @@ from baker.pathtracer.first_hit import first_hits
 from baker.pathtracer.inside_geometry import RAYS, cast_around, is_inside_geometry
 from baker.pathtracer.scene import Reference
 
-# Length of a ray below which it counts as near, texels.
+# Length below which a ray counts as near, texels.
 _NEAR = 2.0
 # Share of near rays above which a texel is in a gap, and share above which it is in contact with another
 # surface.
@@ -46,7 +46,8 @@ class Surroundings:
     Attributes
     ----------
     points : SurfacePoints
-        The points. If a texel has valid points, its points inside geometry are replaced by them.
+        The points. If a texel has valid points, its points inside geometry are replaced by copies of valid
+        points.
     inside : (n,) bool
         Whether all points of the texel are inside geometry.
     valid_share : (n,) float64

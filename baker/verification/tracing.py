@@ -4,9 +4,9 @@ If only rare paths connect a dark point to a light, its first samples are all bl
 Such a point would get no further samples, and its reference would be 0. The standard error of n samples
 therefore includes the mean light of the room divided by n, as if one further sample had that value.
 
-Errors are relative to the light of the point. If that is less than a floor, they are relative to the floor:
-`baker.metrics.error_metrics.dark_floor` of the points in the same room. Dim rooms therefore reach the same
-relative error as bright rooms.
+Errors are relative to the light of the point. If this light is less than a floor, errors are relative to the
+floor. The floor is `baker.metrics.error_metrics.dark_floor` of the points in the same room. Dim rooms
+therefore reach the same relative error as bright rooms.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from baker.pathtracer.scene import Reference
 
 # Number of passes over all points before a point can be finished, and largest number of passes of AO.
 _FIRST, _MAX_AO_PASSES = 8, 1024
-# Share of the time limit during which all unfinished points are traced. After that, only the half of them
-# that needs the fewest samples is traced.
+# Share of the time limit during which all unfinished points are traced. After that, only the half of these
+# points that needs the fewest samples is traced.
 _ALL_POINTS_TIME = 0.4
 # Target standard error of AO (absolute), and largest share of the time limit that AO may take.
 AO_ERROR, _AO_TIME = 0.004, 0.25

@@ -1,4 +1,4 @@
-"""Measures the area of the surface that is not compared, because no texel or an invalid texel stores it."""
+"""Measures the area of surface whose light is stored in no texel or in an invalid texel, so is not compared."""
 
 from __future__ import annotations
 

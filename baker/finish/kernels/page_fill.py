@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from baker.trace.jit import inner, kernel, larger, smaller
 
-# Distance from the border, texels. Beyond it, the fitted plane is continued as a constant.
+# Limit of the distance from the border, texels. Beyond this limit, the fitted plane is continued as a
+# constant.
 SLOPE_REACH = 6.0
 # Largest factor by which the plane increases or decreases a reflected value.
 MOST = 4.0

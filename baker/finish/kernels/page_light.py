@@ -91,11 +91,11 @@ def sum_groups(noisy, filtered, label, light, sums):
 
 @kernel
 def missing_shares(first, owner, across, sums, share):
-    """Write the relative change of each group that restores the light removed in the window around it.
+    """Write the relative change of each group, which restores the light removed in the group's window.
 
     The change is (removed / kept) * n / (n + HALF), where `removed` and `kept` are weighted sums of light
     over the window, and n is its weighted number of texels. The factor n / (n + HALF) reduces the change if
-    the window has few texels, because their sums are noisy.
+    the window has few texels, because the sums over such windows are noisy.
 
     share : (G, C) float64 output, relative change, limited to LEAST and MOST
     first : (blocks + 1,) int64, first group of each block; owner : (n,) int32, chart of each group

@@ -14,20 +14,21 @@ from baker.trace.jit import inner, kernel, larger, scratch, smaller
 # Half side of a window, texels.
 RADIUS = 2
 # Ridge term, which is multiplied by the sum of weights and added to the diagonal of the normal equations,
-# texels^2. If all texels lie on one line, it makes the slope across that line 0.
+# texels^2. If all texels lie on one line, the term makes the slope across that line 0.
 RIDGE = 1e-3
 # Largest amount by which a result may exceed the range of the window's values, as a share of that range.
 HEADROOM = 0.5
-# Factors in a second limit of that amount. Per texel of distance, it is STEEP times the smaller of two
-# numbers: the last difference between texels, and CURVED times the difference before it (see `_trend`).
+# Factors in a second limit of that amount. Per texel of distance, this limit is STEEP times the smaller of
+# two numbers: the last difference between texels, and CURVED times the difference before the last (see
+# `_trend`).
 STEEP, CURVED = 2.0, 3.0
-# Share of the variance in the window that the plane explains. Up to it, a result may not exceed the largest
-# value of the chart.
+# Limit of the share of the variance in the window that the plane explains. Up to this limit, a result may not
+# exceed the largest value of the chart.
 STRAIGHT = 0.95
-# Distance from the chart, texels. Beyond it, extrapolated values are constant.
+# Limit of the distance from the chart, texels. Beyond this limit, extrapolated values are constant.
 MAX_STEP = 2.0
-# Amount by which the change that `match_lookups` makes is reduced, as a share of the texel's value. It is
-# reduced because a bilinear lookup uses few texels, and is therefore noisier than a plane.
+# Amount by which the change that `match_lookups` makes is reduced, as a share of the texel's value. The
+# change is reduced because a bilinear lookup uses few texels, and is therefore noisier than a plane.
 NOISY = 0.03
 # A slope on a noisy page is multiplied by max(1 - DOUBT / F, 0), where F is the slope's variance ratio
 # (F-test). Noise alone gives F = 1 on average.

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Pieces of triangles inside texels.
+"""Finds the pieces of triangles inside texels, and chooses random points in the pieces.
 
 A piece is the polygon in which a triangle, in uv, overlaps the square of a texel. It is found by clipping
 (`baker.kernels.clip`), independent of the rasteriser of the bake.

@@ -15,7 +15,8 @@ from baker.metrics.groups import ComparedPoints
 from baker.verification.points import EDGE, OUTLIER, SCARCE, STEEP, TEXEL, Pages, Points
 from baker.verification.unverified_area import UnverifiedArea
 
-# Share of a texel's square that surface with valid points covers. Below this share, a texel is not interior.
+# Smallest share of a texel's square that surface with valid points covers if the texel is interior, see
+# `ChannelData.interior`.
 _MIN_COVERED = 0.75
 # Share of a cosine-weighted hemisphere around the shading normal that lies below the facet. Above this share,
 # a point counts as tilted.
@@ -62,7 +63,7 @@ class ChannelData:
 
     @property
     def interior(self) -> NDArray[np.bool_]:
-        """Return (n,) bool: the points whose texels valid surface mostly covers, not in gaps, not tilted.
+        """Return (n,) bool: points outside gaps, not tilted, in texels that valid surface mostly covers.
 
         Light levels, regions, objects and charts are compared at these points only.
         """
@@ -74,8 +75,8 @@ class ChannelData:
     def tilted(self) -> NDArray[np.bool_]:
         """Return (n,) bool: the points whose shading normal differs considerably from the face normal.
 
-        There, bake and reference differ: the bake includes light from below the facet, as on a curved
-        surface, and the reference does not. If the shading normal is tilted by an angle t, the share
+        At these points, bake and reference differ: the bake includes light from below the facet, as on a
+        curved surface, and the reference does not. If the shading normal is tilted by an angle t, the share
         (1 - cos t) / 2 of the cosine-weighted hemisphere around it lies below the facet.
         """
         surface = self.points.surface

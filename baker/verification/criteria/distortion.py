@@ -13,7 +13,8 @@ from baker.metrics.misalignment import best_shift, exponent, is_blurred
 from baker.verification.criteria.criterion import ChannelData, Criterion, CriterionResult
 
 # Ratio of the squared errors with and without a shift, below which a chart counts as shifted. It is smaller
-# than for a whole map, because charts have few texels and there are many of them.
+# than the ratio for a whole map (`metrics.misalignment`), because charts have few texels and there are many
+# charts.
 _CHART_BETTER = 0.5
 
 

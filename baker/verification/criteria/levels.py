@@ -1,10 +1,10 @@
 """Computes the own error of each light level, in dark as well as in bright areas.
 
-The own error is defined in `baker.metrics.groups`. A light level contains the texels of all rooms whose light
-is within the same half power of ten. The darkest 5, 10 and 20 % of all texels are further groups, so that a
-fault of the darkest texels is not hidden among brighter texels. Narrower levels would not detect more faults:
-texels are assigned to levels by values that include the error, so a large error moves a texel to another
-level.
+The own error is defined in `baker.metrics.groups`. A light level contains all texels, in any room, whose
+light is within the same half power of ten. The darkest 5, 10 and 20 % of all texels are further groups, so
+that a fault of the darkest texels is not hidden among brighter texels. Narrower levels would not detect more
+faults: texels are assigned to levels by values that include the error, so a large error moves a texel to
+another level.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ EQUAL_WEIGHT = 0.15
 def level_light(compared: ComparedPoints, equal_weight: float) -> NDArray[np.float64]:
     """Return (n,) float64: the light by which points are assigned to levels, a mean of reference and map.
 
-    An error of this light moves points to the next level, which biases the errors in both levels. So the
+    An error of this light moves points to a neighbouring level. This biases the errors in both levels. So the
     reference has more weight where its noise is low, and the map elsewhere. Both have the same weight if the
     relative standard error of the reference is `equal_weight`, which is about the error to be detected.
     """
