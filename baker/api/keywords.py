@@ -186,7 +186,8 @@ class DiffKeywords(TypedDict, total=False):
     # Also compute the FLIP error of the pages.
     flip: bool
 
-    # Limits that fail if they are true: "irradiance.p95 > 0.05, ao.flip > 0.02".
+    # Conditions for failure, separated by commas: "irradiance.p95 > 0.05, ao.flip > 0.02". Default:
+    # none.
     fail_if: str | None
 
     # Seed of all random numbers.
@@ -219,8 +220,8 @@ class RenderKeywords(TypedDict, total=False):
     # Estimator: uniform, cosine, stratified, light, bsdf, mis, mis-power or bdpt.
     estimator: str
 
-    # Largest number of vertices of a path after the camera; 1 is direct light only. Default: no
-    # limit.
+    # Largest number of surface points that reflect light on a path; 1 is direct light only.
+    # Default: no limit.
     max_depth: int | None
 
     # Render ambient occlusion.
@@ -235,7 +236,8 @@ class RenderKeywords(TypedDict, total=False):
     # Run Open Image Denoise over the picture.
     denoise: bool
 
-    # Output folder of a bake: render its scene, lit by its lightmaps instead of path tracing.
+    # Output folder of a bake. Its scene is rendered in place of `scene`, lit by its lightmaps,
+    # without path tracing.
     lightmap: str | Path | None
 
     # Sky radiance R,G,B in cd/m2. Default: black; with `lightmap`, the sky of the bake.
@@ -305,7 +307,8 @@ class UnwrapKeywords(TypedDict, total=False):
 class VerifyKeywords(TypedDict, total=False):
     """Keywords of `VerifySettings`."""
 
-    # Number of random texels to compare; points at edges and outliers are added.
+    # Number of random texels to compare. Points at edges are added. Texels that differ from all
+    # their neighbours, that have large gradients or that have rare light levels are added, too.
     texels: int
 
     # Fixed number of paths for each texel.
@@ -317,7 +320,8 @@ class VerifyKeywords(TypedDict, total=False):
     # Time for path tracing; `inf` is no limit. Default: 40, or no limit if `spp` is set.
     time_limit: float | None
 
-    # Limits that fail if they are true: "irradiance.p95 > 0.05, ao.rmse > 0.02".
+    # Conditions for failure, separated by commas: "irradiance.p95 > 0.05, ao.rmse > 0.02". Default:
+    # the limits of `baker` for each channel.
     fail_if: str | None
 
     # Seed of all random numbers.

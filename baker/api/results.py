@@ -45,7 +45,8 @@ def verify(
         Settings by name, which replace those in `settings`:
 
         texels : int, from 1, default 2000
-            Number of random texels to compare; points at edges and outliers are added.
+            Number of random texels to compare. Points at edges are added. Texels that differ from all their
+            neighbours, that have large gradients or that have rare light levels are added, too.
         spp : int | None, from 1, default None
             Fixed number of paths for each texel.
         target_se : float, above 0, default 0.005
@@ -53,7 +54,8 @@ def verify(
         time_limit : float | None, s, above 0, default None
             Time for path tracing; `inf` is no limit. Default: 40, or no limit if `spp` is set.
         fail_if : str | None, default None
-            Limits that fail if they are true: "irradiance.p95 > 0.05, ao.rmse > 0.02".
+            Conditions for failure, separated by commas: "irradiance.p95 > 0.05, ao.rmse > 0.02". Default:
+            the limits of `baker` for each channel.
         seed : int, 0 to 2147483647, default 0
             Seed of all random numbers.
         threads : int | None, 1 to 1024, default None
@@ -119,7 +121,8 @@ def diff(
         flip : bool, default True
             Also compute the FLIP error of the pages.
         fail_if : str | None, default None
-            Limits that fail if they are true: "irradiance.p95 > 0.05, ao.flip > 0.02".
+            Conditions for failure, separated by commas: "irradiance.p95 > 0.05, ao.flip > 0.02". Default:
+            none.
         seed : int, 0 to 2147483647, default 0
             Seed of all random numbers.
         threads : int | None, 1 to 1024, default None
@@ -193,8 +196,8 @@ def render(
         estimator : str, default 'mis'
             Estimator: uniform, cosine, stratified, light, bsdf, mis, mis-power or bdpt.
         max_depth : int | None, from 1, default None
-            Largest number of vertices of a path after the camera; 1 is direct light only. Default: no
-            limit.
+            Largest number of surface points that reflect light on a path; 1 is direct light only. Default:
+            no limit.
         ao : bool, default False
             Render ambient occlusion.
         ao_distance : str | float | None, m, default None
@@ -204,7 +207,8 @@ def render(
         denoise : bool, default False
             Run Open Image Denoise over the picture.
         lightmap : str | Path | None, default None
-            Output folder of a bake: render its scene, lit by its lightmaps instead of path tracing.
+            Output folder of a bake. Its scene is rendered in place of `scene`, lit by its lightmaps,
+            without path tracing.
         sky : str | float | Sequence[float] | None, cd/m2, default None
             Sky radiance R,G,B in cd/m2. Default: black; with `lightmap`, the sky of the bake.
         sky_strength : float, from 0, default 1.0

@@ -1,4 +1,4 @@
-"""Measures the area of surface whose light is stored in no texel or in an invalid texel, so is not compared."""
+"""Measures the surface area that is not compared, as no valid texel stores the light of the surface."""
 
 from __future__ import annotations
 
