@@ -473,7 +473,8 @@ def test_a_bake_has_one_progress_with_the_time_left_of_all_stages():
     )  # fmt: skip
     shares = [int(re.search(r"(\d+) %", line)[1]) for line in lines]
     assert shares == [5, 10, 40, 70, 70, 85, 100]
-    # Half of the gather took 12 s: 12 s are left of it, and finishing is expected to be as slow as loading.
+    # Half of the gather took 12 s, so the other half is expected to take 12 s. Finishing is expected to be as
+    # slow as loading.
     assert lines[2].startswith("bake: 40 %  gather  23.1 Mrays/s  ")
     left = [float(re.search(r"(\d+) s left", line)[1]) for line in lines]
     assert 12 + 3 < left[2] <= 12 + 3 * 8

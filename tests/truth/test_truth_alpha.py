@@ -36,7 +36,7 @@ def alpha_material(
 
 
 def floor_under(*cards, half=1.0, texels=40, light="directional", **where):
-    """Return a builder, and its black floor of 2 x 2 m under square cards, each 0.1 m above the one before.
+    """Return a builder and its black floor of 2 x 2 m, below square cards at vertical intervals of 0.1 m.
 
     cards : functions that add a material to the builder and return its index
     """

@@ -13,7 +13,7 @@ UP = (0.0, 1.0, 0.0)
 
 
 def square_over(height, half=0.5):
-    """Return the corners of a square at `height`, counter-clockwise seen from below, its front."""
+    """Return the corners of a square at `height` whose front faces down."""
     return np.array(
         [(-half, height, -half), (half, height, -half), (half, height, half), (-half, height, half)]
     )

@@ -1,4 +1,4 @@
-"""Gaps narrower than a texel stay dark in a noisy, bright floor, with and without denoising."""
+"""The floor below plates 1 mm above it stays dark, although the floor around them is bright and noisy."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ UNDER = [(c, r) for c in (4, 12, 20, 28) for r in (4, 12, 20, 28)]
 def _floor_with_plates():
     """Return a builder and its floor: 2 m wide, with plates 1 mm above it; all surfaces are black.
 
-    A canopy 1 m above the floor covers x > 0.5 and is closed at x = 20.
+    A canopy 1 m above the floor extends from x = 0.5 to x = 20. There, a wall closes the space below it.
     """
     builder = SceneBuilder(160)
     black = builder.material(0.0, double_sided=True)
@@ -45,8 +45,8 @@ def test_gaps_stay_dark_and_the_floor_has_its_light(denoise):
     for column, row in UNDER:
         under[row : row + 2, column : column + 2] = True
     # Below a plate at height h, a point at a distance d from an edge receives (1 - d / hypot(d, h)) / 2 of
-    # the sky's light through that edge. The mean over a texel is at most h / SIDE / 2, and each texel has two
-    # edges.
+    # the sky's light through that edge. For two opposite edges together, the mean over a texel is at most
+    # h / SIDE / 2. A plate has two pairs of opposite edges.
     assert found[under].mean() < HEIGHT / SIDE
     x = (np.arange(COLUMNS * 64) + 0.5) / (COLUMNS * 64) * 2.0
     want = _sky_share(x).reshape(COLUMNS, 64).mean(axis=1)

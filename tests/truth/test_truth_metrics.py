@@ -25,7 +25,8 @@ from baker.pathtracer.estimators import ESTIMATORS
 
 SQUARE = np.array([[(0, 0, 0), (1, 0, 0), (1, 1, 0)], [(0, 0, 0), (1, 1, 0), (0, 1, 0)]]) - (0.5, 0.5, 0)
 
-# {estimator: samples of a pass}. Estimators without MIS only hit lights or only sample them, and need more.
+# {estimator: samples of a pass}. Estimators without MIS find lights only by chance or only by
+# sampling them, so they need more samples.
 RAYS = {name: 256 if how.aim == 2 else 1024 for name, how in ESTIMATORS.items()}
 
 # {estimator: (albedo of each colour, passes of 256 x 64 paths)}. With uniform directions the variance is
@@ -245,7 +246,7 @@ def test_lights_without_area_are_exact(light, truth, estimator):
 
 @pytest.mark.parametrize("estimator", ["light", "bdpt"])
 def test_a_point_light_over_a_square_half_in_shadow(estimator):
-    """Mean E is I x (solid angle of the square - solid angle of the screen) / area, seen from the light."""
+    """Mean E is I x (solid angle of the unshadowed part of the square, seen from the light) / area."""
     screen = Quad((-0.1, -0.2, 0.5), (0.2, 0, 0), (0, 0.3, 0), grey(0.0, double_sided=True))
     light = PunctualLight("point", "p", 0, (2.0, 2.0, 2.0), (0.1, 0.0, 1.0))
     scene = replace(quad_scene([screen]), lights=(light,))

@@ -40,7 +40,7 @@ def test_the_sun_outside_does_not_end_the_solve_of_a_room(bulb):
 
 
 def boxes(radiance):
-    """Return a builder and the floors of closed rooms in a row; `radiance` is that of their emitters."""
+    """Return a builder and the floors of closed rooms in a row; room k has an emitter of `radiance[k]`."""
     builder = SceneBuilder(96)
     floors = []
     for k, emission in enumerate(radiance):
