@@ -79,11 +79,29 @@ def new_document(scene: Scene, atlas: Atlas) -> tuple[Packer, list[BakedUse], li
                     "extensions": {"KHR_lights_punctual": {"light": number}},
                 }
             )
-    document["scenes"] = [{"name": scene.name, "nodes": list(range(len(nodes)))}]
+    document["scenes"] = [{**scene_name(scene), "nodes": list(range(len(nodes)))}]
     document["scene"] = 0
     if extensions:
         document["extensionsUsed"] = sorted(extensions)
     return packer, uses, instance_mesh
+
+
+def scene_name(scene: Scene) -> Json:
+    """Return the key `name` of a scene; none for a scene that was read, which is named after its file.
+
+    So a renamed file gives the same bytes.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+
+    Returns
+    -------
+    dict
+        The key and the name, or nothing.
+    """
+    return {"name": scene.name} if scene.path is None else {}
 
 
 def _mirrors(instance: Instance) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from baker.core.errors import InputError
 from baker.core.scene import Scene
 from baker.core.source_mesh import SourcePrimitive, SourceScene
-from baker.io.gltf.build_document import material_json
+from baker.io.gltf.build_document import material_json, scene_name
 from baker.io.gltf.packer import Json, Packer
 
 
@@ -49,18 +49,19 @@ def source_glb(scene: Scene, source: SourceScene) -> bytes:
         }
         for k in filled
     ]
+    written = {mesh: k for k, mesh in enumerate(filled)}
     nodes: list[Json] = []
     for instance in source.instances:
-        if instance.mesh not in filled:
+        if instance.mesh not in written:
             continue
-        node: Json = {"name": instance.name, "mesh": filled.index(instance.mesh)}
+        node: Json = {"name": instance.name, "mesh": written[instance.mesh]}
         if not np.array_equal(instance.world_from_object, np.eye(4)):
             node["matrix"] = instance.world_from_object.T.ravel().tolist()
         nodes.append(node)
     if not nodes:
         message = "the file holds no triangles; export it again"
         raise InputError(message, file=str(scene.path) if scene.path else None)
-    document |= {"nodes": nodes, "scenes": [{"name": scene.name, "nodes": list(range(len(nodes)))}]}
+    document |= {"nodes": nodes, "scenes": [{**scene_name(scene), "nodes": list(range(len(nodes)))}]}
     document["scene"] = 0
     if extensions:
         document["extensionsUsed"] = sorted(extensions)

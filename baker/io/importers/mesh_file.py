@@ -23,6 +23,8 @@ from baker.io.mesh.scene import scene_of_meshes, to_world
 # trimesh logs errors with a traceback. Without a handler, Python would print them to stderr.
 logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
+# Name of the object: not that of the file, so that a renamed file gives the same bytes.
+_NAME = "mesh"
 _GREY = Material(name="default", base_colour=(0.8, 0.8, 0.8, 1.0), metallic=0.0)
 
 
@@ -51,7 +53,6 @@ def import_mesh_file(source: SceneFile) -> Scene:
     except Exception as error:  # the parsers raise many kinds of exceptions on broken data
         why = f"{type(error).__name__}: {' '.join(str(error).split())}"[:160]
         raise InputError(f"the file cannot be parsed as {kind.upper()} ({why})", file=file) from None
-    name = source.path.name.split(".")[0]
     primitives = []
     for number, (position, face, normal, colour) in enumerate(arrays):
         if not source.lenient and len(face) and not (face.min() >= 0 and face.max() < len(position)):
@@ -70,7 +71,7 @@ def import_mesh_file(source: SceneFile) -> Scene:
             )
         )
     sha256 = hashlib.sha256(source.data).hexdigest()
-    return scene_of_meshes(source, [(name, primitives)], [_GREY], [], sha256)
+    return scene_of_meshes(source, [(_NAME, primitives)], [_GREY], [], sha256)
 
 
 def _parse(data: bytes, kind: str) -> list[dict[str, Any]]:
