@@ -3,8 +3,8 @@
 `baker.comparison.pairs` pairs the objects of both bakes. If the two objects of a pair have equal meshes, the
 matching point is in the triangle with the same number and has the same barycentric weights. So the difference
 of a bake from itself is exactly 0, and objects that were moved between the bakes are still compared. If the
-meshes differ, the nearest point of b is searched along the normal. It must be within a small distance in
-world space, on a face with a similar normal.
+meshes differ, the nearest point of b is searched along the normal. This point must be within a small distance
+in world space, on a face with a similar normal.
 """
 
 from __future__ import annotations

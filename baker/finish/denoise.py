@@ -59,8 +59,8 @@ from baker.finish.tiles import over_rows
 
 __all__ = ["denoise_page", "denoiser_name", "surround_charts"]
 
-# Largest distance between an empty texel's nearest covered texel and its mirror texel, texels. It is the
-# radius of the filter (its tile overlap).
+# Largest distance between an empty texel's nearest covered texel and its mirror texel, texels. This distance
+# is the radius of the filter (its tile overlap).
 REACH = 96
 # MARGIN: smallest number of mirrored texels at each side of the image. BLOCK: the sides of the extended image
 # are multiples of BLOCK. The filter shifts the colour of the outermost texels. The shift is larger if the
@@ -104,8 +104,9 @@ def denoise_page(
     chart : (H, W) int32
         Index of the chart of each covered texel.
     standard_error : (H, W) float32, optional
-        Standard error of each texel's mean luminance (if C = 1, of its value), in the unit of `value`. It
-        limits the change of a texel. None means that it is estimated from the page.
+        Standard error of each texel's mean luminance (if C = 1, of its value), in the unit of `value`. The
+        standard error limits the change of a texel. None means that the standard error is estimated from the
+        page.
     bound : bool
         Whether `standard_error` is an upper bound. If so, it is lowered to at most `FITTED` times the noise
         estimated from the page.

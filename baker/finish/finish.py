@@ -224,7 +224,7 @@ def finish_page(
         if rules.signed:
             np.maximum(centred, flat.min(axis=0, initial=0.0), out=centred)
         total += centred
-        # Free the arrays before the next layer is denoised, which is the peak of a bake's memory.
+        # Free the arrays now, because a bake needs the most memory while it denoises the next layer.
         del filled, denoised, centred, flat
     rules.clip(total)
     grown_value, grown = dilate(

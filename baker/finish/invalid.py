@@ -37,8 +37,8 @@ def fill_invalid(
     value : (H, W, C) float32
         A new page; valid and empty texels are unchanged.
     n_hopeless : int
-        Number of texels in charts without any valid texel. They keep their values; values that are not finite
-        become 0.
+        Number of texels in charts without any valid texel. These texels keep their values; values that are
+        not finite become 0.
 
     Raises
     ------

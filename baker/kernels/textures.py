@@ -208,7 +208,7 @@ def value_limits(pack: TexturePack, k: int) -> tuple[NDArray[np.float32], NDArra
 def _halved(image: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the averages of blocks of 2 x 2 texels.
 
-    If the number of rows or columns is odd, the last one is left out, unless it is the only one.
+    If the number of rows or columns is odd, the last row or column is left out, unless it is the only one.
     """
     rows = (
         image

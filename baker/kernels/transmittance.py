@@ -7,10 +7,10 @@
 Along a shadow ray, Embree's filter function multiplies the T of all BLEND surfaces that the ray crosses
 (`shading.kernels.alpha_filter`).
 
-A ray that is traced to its first hit passes each BLEND surface with probability 1 - a. Its light is then
-multiplied by lerp(1, c, a) for each surface that it passed, so that its expected factor is T. Embree calls
-the filter function for hits in any order, including hits beyond the first hit. Therefore the colours are
-multiplied along a second ray, which ends at the first hit of the first ray. The second ray is traced in a
+A ray that is traced to its first hit passes each BLEND surface with probability 1 - a. The light of the ray
+is then multiplied by lerp(1, c, a) for each surface that it passed, so that its expected factor is T. Embree
+calls the filter function for hits in any order, including hits beyond the first hit. Therefore the colours
+are multiplied along a second ray, which ends at the first hit of the first ray. The second ray is traced in a
 second tree that contains only the BLEND triangles.
 
 The argument `blend` of the functions below is a `BlendBuffers`, or None in scenes without BLEND surfaces.

@@ -16,19 +16,20 @@ colours. Means and medians are over all points, unless stated otherwise:
 `median`, `p95`, `p99` and `max` are statistics of the relative error. Without the floor in the denominator,
 dark points would dominate them.
 
-`colour_median` and `colour_p95` are the median and the 95th percentile of the colour error. They are computed
-for each colour, and the largest is returned. A mean over colours would not detect that red and blue are
-swapped. `colour_bias` is mean(v_c - r_c) / mean(r_c) of the colour where this ratio is farthest from 0. The
-denominator is at least a tenth of mean(r).
+`colour_median` and `colour_p95` are the median and the 95th percentile of the colour error. Both are computed
+for each colour, and the largest values are returned. A mean over colours would not detect that red and blue
+are swapped. `colour_bias` is mean(v_c - r_c) / mean(r_c) of the colour where this ratio is farthest from 0.
+The denominator is at least a tenth of mean(r).
 
 `noise_floor` and `noise_p95` are the median and the 95th percentile of the relative error that the noise of
 the reference causes. The reference is the mean of two independent halves. The noise of this mean is estimated
 as half the difference of the halves, because both have the same variance.
 
-`energy_ratio` is the ratio R of the total light of the bake to that of the reference. It detects gain or loss
-of energy, as a furnace test does. The points are weighted by area, unlike in `bias`, because small objects
-have more points per area. `energy_ratio_se` is the standard error of R as a ratio estimator. It includes the
-noise of the reference and the random choice of points, because both change v - R r.
+`energy_ratio` is the ratio R of the total light of the bake to that of the reference. This ratio detects gain
+or loss of energy, as a furnace test does. The points are weighted by area, unlike in `bias`, because small
+objects have more points per area. `energy_ratio_se` is the standard error of R as a ratio estimator. This
+standard error includes the noise of the reference and the random choice of points, because both change
+v - R r.
 
 Based on: Rousselle, Knaus and Zwicker, Adaptive sampling and reconstruction using greedy error minimization,
 2011 (relMSE); Cochran, Sampling Techniques, 1977, chapter 6 (ratios).

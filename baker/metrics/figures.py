@@ -1,4 +1,4 @@
-"""What each figure of `verify` and `diff` means, in one phrase, and how its value is written.
+"""Explains each metric of `verify` and `diff` in one phrase, and defines how its value is written.
 
 `FIGURES` is the only table of explanations. The text output, the HTML report and `docs/ACCURACY.md` use it.
 The definitions are in `baker.metrics.error_metrics` and in the modules of `baker.verification.criteria`.
@@ -10,20 +10,20 @@ from typing import Any, NamedTuple
 
 from baker.core.readable import number, percent
 
-# How the value of a figure is written.
+# Formats in which the value of a metric is written, see `Figure.kind`.
 SHARE, SIGNED, COUNT, YES_NO, NUMBER, AREA = "share", "signed", "count", "yes or no", "number", "area"
 
 
 class Figure(NamedTuple):
-    """An error metric as people read it.
+    """The explanation of a metric in reports, and the format of its value.
 
     Attributes
     ----------
     phrase : str
-        What it means.
+        What the metric means.
     kind : str
-        How its value is written: `SHARE` in percent, `SIGNED` in percent with a sign, `COUNT` as an integer,
-        `YES_NO` as a word, `NUMBER` without a unit, `AREA` in m2.
+        How the value of the metric is written: `SHARE` in percent, `SIGNED` in percent with a sign, `COUNT`
+        as an integer, `YES_NO` as a word, `NUMBER` without a unit, `AREA` in m2.
     """
 
     phrase: str
@@ -118,19 +118,19 @@ FIGURES: dict[str, Figure] = {**_WHOLE, **_OF_GROUPS, **_EDGES, **_FAULTS, **_UN
 
 
 def figure_text(name: str, value: Any) -> str:
-    """Return the value of a figure as people read it, with three significant digits.
+    """Return the value of a metric as text, with three significant digits.
 
     Parameters
     ----------
     name : str
-        Name of the figure; one that is not in `FIGURES` is written as a number.
+        Name of the metric. The value of a metric that is not in `FIGURES` is written as a number.
     value : number, list of numbers, or None
-        Its value.
+        Value of the metric.
 
     Returns
     -------
     str
-        "1.52%" for 0.0152 of a share; "-" without a value.
+        For example "1.52%" for the value 0.0152 of a metric of the kind `SHARE`; "-" without a value.
     """
     if value is None:
         return "-"
@@ -149,7 +149,7 @@ def figure_text(name: str, value: Any) -> str:
 
 
 def limit_text(name: str, operator: str, limit: float) -> str:
-    """Return a limit on a figure as people read it, such as "> 1.5%"."""
+    """Return a limit on a metric as text, such as "> 1.5%"."""
     if _kind(name) == YES_NO and operator == ">" and limit == 0:
         return "yes"
     shown = percent(limit) if _kind(name) in (SHARE, SIGNED) else f"{limit:g}"

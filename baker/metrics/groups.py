@@ -19,8 +19,8 @@ deviation is significant.
 
 The standard error of bias and colour is the largest of these:
 
-- the standard error of the jackknife, from the change if one point is left out. It contains the noise of bake
-  and reference, and is large if one bright point dominates;
+- the standard error of the jackknife, from the change if one point is left out. This error contains the noise
+  of bake and reference, and is large if one bright point dominates;
 - for the bias, the standard error of the reference alone;
 - half the difference of the results of two halves of the reference.
 

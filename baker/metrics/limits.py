@@ -53,7 +53,7 @@ class Limit:
 
     @property
     def readable(self) -> str:
-        """Return the operator and the number as people read them, such as "> 1.5%"."""
+        """Return the operator and the number as text in the format of the metric, such as "> 1.5%"."""
         return limit_text(self.metric, self.operator, self.number)
 
 
@@ -75,7 +75,7 @@ class Verdict:
 
     @property
     def readable(self) -> str:
-        """Return the value as people read it, such as "2.3%"; "missing" if it could not be computed."""
+        """Return the value as text in the metric's format, such as "2.3%"; "missing" without a value."""
         return "missing" if self.value is None else figure_text(self.limit.metric, self.value)
 
     def sentence(self) -> str:

@@ -81,8 +81,8 @@ def steep_texels(maps: NDArray[np.float32], covered: NDArray[np.bool_], count: i
     """Return the texels at which the left and right, or upper and lower, neighbours differ most.
 
     The effect of a shift or a blur of the map is largest at these texels. The difference is relative to the
-    brighter neighbour. For the ranking it is limited to one half, so that soft shadow edges have the same
-    rank as sharp edges of gaps.
+    brighter neighbour. For the ranking, this relative difference is limited to one half, so that soft shadow
+    edges have the same rank as sharp edges of gaps.
 
     Parameters
     ----------

@@ -74,7 +74,8 @@ def own_error(
     noise : (n,) float64
         Standard errors of the reference, estimated from its passes.
     apart : (n,) float64
-        Half the difference of two independent halves of the reference. It has the variance of their mean.
+        Half the difference of two independent halves of the reference. This half difference has the variance
+        of the mean of the halves.
     floor : float
         Lower limit of the light to which errors are relative.
     z : float

@@ -1,4 +1,4 @@
-"""Builds the settings of a pass as a tuple of integers, which is an argument of kernels.
+"""Builds the settings of a pass as a tuple of integers, which kernels take as an argument.
 
 `path_settings` is not in `pathtracer.estimators`, so that the command line can import the names of estimators
 without loading kernels.

@@ -8,8 +8,8 @@ shadow rays, the probe rays, are cast from the tile to each cluster to find whet
 - Clusters that no probe ray reaches are called hidden. They form a separate stratum with few samples, which
   MIS combines with gather rays that hit these clusters. So a cluster that is visible only through a small
   opening still contributes.
-- If a much brighter cluster than others (`_OUTSHINES`) is visible from only a part of the tile, visible and
-  hidden clusters are found for each block of up to sixteen consecutive texels.
+- If a cluster that is much brighter than another visible cluster (`_OUTSHINES`) is visible from only a part
+  of the tile, visible and hidden clusters are found for each block of up to sixteen consecutive texels.
 
 Based on: Ward, Adaptive shadow testing for ray tracing, 1991; Georgiev et al., Importance caching for complex
 illumination, 2012.
@@ -271,8 +271,8 @@ class EmitterChooser:
         if not hidden.any() or not (all_emitters.chance[~hidden] > 0).any():
             return Choice(part, all_emitters, None, all_emitters, widest_view(self.emitters, origin))
         visible, others = only(self.emitters, ~hidden), only(self.emitters, hidden)
-        # Do not use the closed form for hidden emitters. It requires that no shadow ray is blocked, and too
-        # few shadow rays are cast to test that.
+        # Do not use the closed form for hidden emitters. The closed form requires that no shadow ray is
+        # blocked, and too few shadow rays are cast to test that.
         others.row[others.row[:, TEXTURED] == 0.0, TEXTURED] = NO_CLOSED_FORM
         seen, apart = tile_emitters(visible, origin), tile_emitters(others, origin)
         chance = np.zeros_like(all_emitters.chance)

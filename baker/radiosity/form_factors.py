@@ -334,7 +334,8 @@ def _balanced(
     first, column, value, exchanged, unlike = merged
     reciprocity = unlike / max(exchanged, 1e-300)
     goal = 1.0 - sky.astype(np.float64) - lost
-    # Estimate the uncertainty of each measured row sum. It is 0 in a closed scene, where no ray misses.
+    # Estimate the uncertainty of each measured row sum. The uncertainty is 0 in a closed scene, where no ray
+    # misses.
     slack = _SLACK * (1.0 - goal) * len(area) / max(rays, 1)
     row_error = sinkhorn_balance(first, column, value, goal, slack, np.ones(len(area)), _BALANCE_STEPS)
     return FormFactorMatrix(first, column, value, sky, lost, float(row_error), reciprocity, rays)

@@ -419,10 +419,10 @@ def _order_sides(
 ) -> tuple[NDArray[np.int32], SideTable, NDArray[np.int32]]:
     """Choose the side that gets a split texel's original entry: the side with the largest weight of points.
 
-    If many rays of a side hit backs of one-sided surfaces, its points have a smaller weight. Such a side
-    lies, for example, outside a room with one-sided walls, or under a one-sided floor. A side whose region
-    contains no unsplit texel is chosen only if this is true of all sides of the texel. An example of such a
-    region is the strip of a wall below the floor, if it is narrower than a texel.
+    If many rays of a side hit backs of one-sided surfaces, the points of the side have a smaller weight. Such
+    a side lies, for example, outside a room with one-sided walls, or under a one-sided floor. A side whose
+    region contains no unsplit texel is chosen only if this is true of all sides of the texel. An example of
+    such a region is the strip of a wall below the floor, if this strip is narrower than a texel.
 
     root : (n,) int32, from `join_linked`: entries have the same root if links connect them
     backs : (S, groups) float64, from `_back_share`

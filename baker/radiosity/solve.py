@@ -306,7 +306,7 @@ def energy_audit(
     indirect: NDArray[np.float64],
     albedo: NDArray[np.float64],
 ) -> dict[str, float]:
-    """Return the luminous flux from lights to surfaces, and the parts of it that are absorbed and escape.
+    """Return the luminous flux from lights to surfaces, the absorbed flux and the escaped flux.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ class ClosedParts(NamedTuple):
         one object is left out as well.
     outward : (T,) int8
         1 if the triangle's normal points out of the space that its part encloses, -1 if it points into that
-        space, 0 if the part encloses no space. Parts without a lid are treated as if they had one.
+        space, 0 if the part encloses no space. Parts without a lid are treated as if they had a lid.
     closed : (P,) bool
         Whether the part encloses a space, with at most small holes.
     watertight : (P,) bool

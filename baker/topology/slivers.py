@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 # Limit of the height of a triangle divided by its longest side. Below this limit, the triangle is a sliver. A
-# sliver up to 50 texels long is less than one texel high, so no texel lies in it alone. The smallest angle of
-# a sliver is under 2.3 degrees (tan = 2 x 0.02). `baker check` reports slivers, and `--repair` remeshes a
-# mesh if a tenth of its faces are slivers. Both use this limit, so that only meshes that the check reports
-# are remeshed.
+# sliver up to 50 texels long is less than one texel high, so no texel lies completely inside the sliver. The
+# smallest angle of a sliver is under 2.3 degrees (tan = 2 x 0.02). `baker check` reports slivers, and
+# `--repair` remeshes a mesh if a tenth of its faces are slivers. Both use this limit, so that only meshes
+# that the check reports are remeshed.
 SLIVER = 0.02
 
 

@@ -55,7 +55,7 @@ _MOST_OF_SCENE = 0.5
 # _HELD: number of parts within such a box that are tested for being inside.
 _LARGEST, _HELD = 32, 64
 # Upper limit of the number of faces of a part times the number of parts that are tested for being inside this
-# part. It bounds the time. At least _HELD parts are tested.
+# part. This limit bounds the time. At least _HELD parts are tested.
 _MOST_WORK = 200_000_000
 
 
@@ -115,7 +115,7 @@ class Solids(NamedTuple):
 
 
 def lights_and_cameras(scene: Scene) -> NDArray[np.float64]:
-    """Return the positions of lights and cameras. A closed part around one of them is a room.
+    """Return the positions of lights and cameras. A closed part around a light or a camera is a room.
 
     Parameters
     ----------

@@ -117,7 +117,7 @@ class Tracer(NamedTuple):
     blend_scene : int or None
         Address of the RTCScene of the BLEND triangles that let light through; None without such triangles.
     coherent : bool
-        Whether packets are traced as coherent, which is so up to `MAX_COHERENT_TRIANGLES` triangles.
+        Whether packets are traced as coherent: true for up to `MAX_COHERENT_TRIANGLES` triangles.
     coloured : bool
         Whether any triangle of `blend_scene` colours the light that passes through it.
     """

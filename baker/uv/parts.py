@@ -13,10 +13,10 @@ JOB_TRIANGLES = 20_000
 # time of xatlas grows faster than linearly with the size of a part, and xatlas crashed on a part of 328,000
 # triangles.
 SPLIT_TRIANGLES = 40_000
-# xatlas treats neighbours as one plane if their normals differ by less than about 2.5 degrees. It joins them
-# transitively, so that a finely tessellated sphere becomes one "planar" chart. SMOOTH_DOT is about the cosine
-# of that angle. Triangles joined by this rule form a region. A region of more than SMOOTH_TRIANGLES triangles
-# is cut if it is not flat, see MIN_FACING.
+# xatlas treats neighbours as one plane if their normals differ by less than about 2.5 degrees. xatlas joins
+# such neighbours transitively, so that a finely tessellated sphere becomes one "planar" chart. SMOOTH_DOT is
+# about the cosine of that angle. Triangles joined by this rule form a region. A region of more than
+# SMOOTH_TRIANGLES triangles is cut if it is not flat, see MIN_FACING.
 SMOOTH_DOT = 0.9985
 SMOOTH_TRIANGLES = 500
 # Smallest cosine, of about 40 degrees, between the normals of a flat region and their mean. A region with a

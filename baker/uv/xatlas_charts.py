@@ -148,8 +148,8 @@ def _true_to_size(
 ) -> NDArray[np.float64]:
     """Scale each chart along u and v to the edge lengths in space, then uniformly to the area in space.
 
-    sqrt(a) and sqrt(b) are the scales along u and v. They solve a du^2 + b dv^2 = length^2 over all edges of
-    a chart by least squares. du and dv are the components of an edge in uv.
+    sqrt(a) and sqrt(b) are the scales along u and v. a and b are the least-squares solution of a du^2 + b
+    dv^2 = length^2 over all edges of a chart. du and dv are the components of an edge in uv.
 
     texel : (T, 3, 2), uv of the corners; corner : (T, 3, 3), positions of the corners; area : (T,), areas of
     the triangles in space; chart : (T,), charts of the triangles. Returns (T, 3, 2).

@@ -81,7 +81,7 @@ def find_surroundings(reference: Reference, points: SurfacePoints, seed: int) ->
     gap = (near.mean(axis=1) > _GAP) | inside
     room = np.full(len(air), -1, np.int32)
     eyes = np.zeros((0, 3))
-    # The second round uses points in the air of texels that are in no room yet. It finds small rooms.
+    # The second round uses points in the air of texels that are in no room yet. This round finds small rooms.
     for _ in range(2):
         left = np.flatnonzero((room < 0) & ~gap)
         some = _outside(reference, air[left[random.permutation(len(left))[:_AIR]]], seed)

@@ -1,4 +1,4 @@
-"""Says in one sentence whether a verified bake is good."""
+"""Writes one sentence that says whether a verified bake passed its limits, and how large its error is."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _NAMED = 3
 def verdict_sentence(
     verdicts: Sequence[Verdict], metrics: Mapping[str, Mapping[str, Any]], *, default: bool
 ) -> str:
-    """Return one sentence: whether the bake is good, by which limits, and how large its error is.
+    """Return one sentence: whether the bake passed, which limits were used, and how large the error is.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def verdict_sentence(
     metrics : mapping of str to mapping of str to number or None
         Metrics by channel and name.
     default : bool
-        Whether the limits are the default ones; else they are those of the setting `fail_if`.
+        Whether the limits are the default limits. If false, they are the limits of the setting `fail_if`.
 
     Returns
     -------

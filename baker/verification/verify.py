@@ -156,7 +156,7 @@ class VerifyReport(Result):
 
     @property
     def verdict(self) -> str:
-        """Return one sentence: whether the bake is good, by which limits, and how large its error is."""
+        """Return one sentence: whether the bake passed, by which limits, and how large its error is."""
         metrics = {name: check.metrics for name, check in self.channels.items()}
         return verdict_sentence(self.verdicts, metrics, default=self.settings.fail_if is None)
 

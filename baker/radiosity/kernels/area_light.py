@@ -326,7 +326,7 @@ def light_samples(
                             light *= transmittance(buffers.blend, c, lane)
                             part[k, c * PACKET_WIDTH + lane] += light * weight[lane]
                             part[k, (3 + c) * PACKET_WIDTH + lane] += light * weight[PACKET_WIDTH + lane]
-        # Use the closed form if no test ray is blocked. It has no variance, so `second` stays 0.
+        # Use the closed form if no test ray is blocked. The closed form has no variance, so `second` stays 0.
         if untextured and blocked == 0 and tested >= _MIN_TESTS * lanes and n_samples >= N_POINTS:
             for lane in range(lanes):
                 analytic[group + lane] = 1

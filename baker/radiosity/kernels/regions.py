@@ -37,7 +37,7 @@ def flood_regions(chart, region, queue):
     Distances are numbers of steps between texels that share an edge, within the chart.
 
     chart : (H, W) int32, chart of each texel of a page, -1 for empty texels
-    region : (H, W) int32, -1 for texels without a region, which are filled in
+    region : (H, W) int32, region of each texel; on entry, -1 for texels without a region
     queue : (H * W,) int64, working memory
     """
     height, width = chart.shape

@@ -73,7 +73,7 @@ class ChannelData:
 
     @property
     def tilted(self) -> NDArray[np.bool_]:
-        """Return (n,) bool: the points whose shading normal differs considerably from the face normal.
+        """Return (n,) bool: the points whose shading normal is tilted against the face normal (`_MAX_BELOW`).
 
         At these points, bake and reference differ: the bake includes light from below the facet, as on a
         curved surface, and the reference does not. If the shading normal is tilted by an angle t, the share

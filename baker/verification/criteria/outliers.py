@@ -1,4 +1,4 @@
-"""Counts the outliers, which are texels that differ from all their neighbours, and the wrong outliers."""
+"""Counts the outliers (texels that differ from all their neighbours), and the outliers with wrong values."""
 
 from __future__ import annotations
 
