@@ -77,8 +77,9 @@ def picture_uri(linear: NDArray[np.float32]) -> str:
     Parameters
     ----------
     linear : (H, W), (H, W, 1) or (H, W, 3) float32
-        Values of one component are clipped to 0 to 1 and stored linearly. A colour x becomes x / (x + m),
-        sRGB-encoded, where m is the median of all colour means above 0.
+        A picture of one component is clipped to 0 to 1 and not sRGB-encoded. Each component x of a colour
+        picture becomes x / (x + m), sRGB-encoded. m is the median, over the pixels whose mean of R, G and B
+        is above 0, of this mean; 1 if there are no such pixels.
 
     Returns
     -------

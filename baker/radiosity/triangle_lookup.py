@@ -45,8 +45,8 @@ def build_triangle_lookup(geometry: Geometry, texels: TexelBuffer, emitters: Emi
     row[:, UV_EDGE_1 : UV_EDGE_1 + 2] = uv[:, 1] - uv[:, 0]
     row[:, UV_EDGE_2 : UV_EDGE_2 + 2] = uv[:, 2] - uv[:, 0]
     row[:, PAGE] = geometry.page
-    # If there are no back entries, no double-sided triangle covers a texel. Treat all triangles as one-sided
-    # then, because lookups of backs would find nothing.
+    # `texels` has an entry for the back of each texel that a double-sided triangle covers. Without such
+    # entries, mark all triangles as one-sided, because lookups of backs would read past the end of `lookup`.
     row[:, DOUBLE_SIDED] = geometry.double_sided & (texels.n > texels.n_front)
     row[:, FACE_NORMAL : FACE_NORMAL + 3] = geometry.face_normal
     row[:, FACE_AREA] = geometry.area
