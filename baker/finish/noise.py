@@ -46,37 +46,44 @@ def estimate_error(
     over_rows(
         lambda first, end: high_pass(luminance, chart, covered, passed, first, end), len(luminance), threads
     )
-    rows, columns = np.nonzero(covered)
     error = np.zeros(luminance.shape, np.float32)
-    if len(rows) == 0:
+    if not covered.any():
         return error
-    own = chart[rows, columns].astype(np.int64)
-    n_across = luminance.shape[1] // BLOCK + 1
-    n_blocks = n_across * (luminance.shape[0] // BLOCK + 1)
-    block = (rows // BLOCK) * n_across + columns // BLOCK
-    group = own * n_blocks + block
-    size = np.abs(passed[rows, columns])
+    size = np.abs(passed[covered])
     known = np.isfinite(size)
-    everywhere = float(np.median(size[known])) if known.any() else 0.0
-    by_chart = _grouped_median(own, size, known, np.full(len(rows), everywhere))
-    by_block = _grouped_median(group, size, known, by_chart)
-    error[rows, columns] = (by_block / NORMAL_MEDIAN).astype(np.float32)
+    everywhere = np.full(1, float(np.median(size[known])) if known.any() else 0.0)
+    by_chart = _grouped_median(chart[covered], size, known, everywhere)
+    by_block = _grouped_median(_chart_blocks(chart, covered), size, known, by_chart)
+    error[covered] = (by_block / NORMAL_MEDIAN).astype(np.float32)
     return error
 
 
+def _chart_blocks(chart: NDArray[np.int32], covered: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return (n,) int64: for each covered texel, a number of its chart in its block of 16 x 16 texels."""
+    rows, columns = np.nonzero(covered)
+    rows //= BLOCK
+    columns //= BLOCK
+    n_across = covered.shape[1] // BLOCK + 1
+    rows *= n_across
+    rows += columns
+    rows += chart[covered].astype(np.int64) * (n_across * (covered.shape[0] // BLOCK + 1))
+    return rows
+
+
 def _grouped_median(
-    group: NDArray[np.int64],
+    group: NDArray[np.integer],
     size: NDArray[np.float32],
     known: NDArray[np.bool_],
     otherwise: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     # Return (n,) float64: for each texel, the upper median of `size` over the texels of its group where
     # `known` is set. If `known` is set at fewer than FEWEST texels of the group, return the texel's item of
-    # `otherwise`. All arguments are (n,).
-    _, index = np.unique(group, return_inverse=True)
-    count = np.bincount(index[known], minlength=int(index.max()) + 1)
-    order = np.lexsort((size[known], index[known]))
+    # `otherwise`, which has 1 or n items. All other arguments are (n,).
+    index = np.unique(group, return_inverse=True)[1]
+    kept, own = size[known], index[known]
+    count = np.bincount(own, minlength=int(index.max()) + 1)
+    ordered = np.append(kept[np.lexsort((kept, own))], np.float32(0.0))
     start = np.concatenate(([0], np.cumsum(count)[:-1]))
-    ordered = np.append(size[known][order].astype(np.float64), 0.0)
-    median = ordered[np.minimum(start + count // 2, len(ordered) - 1)]
+    median = ordered[np.minimum(start + count // 2, len(ordered) - 1)].astype(np.float64)
+    del kept, own, ordered
     return np.where(count[index] >= FEWEST, median[index], otherwise)
