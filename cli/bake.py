@@ -57,7 +57,7 @@ def bake_command(
         with held(out):
             result = bake(scene, out=out, settings=settings, progress=progress, force=force, **spread)
     if not run.quiet:
-        write_summary(result, run.text, verbose=run.verbose)
+        write_summary(result, run.text, verbose=run.verbose, noted=progress.noted)
     if run.as_json:
         run.session.write_json(bake_json(result))
 

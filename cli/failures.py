@@ -8,6 +8,7 @@ import sys
 from typing import Any, TextIO
 
 from baker.cli.flags import in_flags
+from baker.cli.foreign_flags import answer_error
 from baker.core import error_mapping as failure
 from baker.core.errors import BakerError, SettingsError
 
@@ -31,6 +32,9 @@ def explain(error: BaseException) -> BakerError | None:
     except ImportError:
         return None
     if isinstance(error, typer.TyperException):
+        foreign = answer_error(error)
+        if foreign is not None:
+            return SettingsError(foreign)
         context = getattr(error, "ctx", None)
         hint = f"; see `{context.command_path} --help`" if context is not None else ""
         return SettingsError(_sentence(error.format_message()).rstrip(".") + hint)

@@ -10,6 +10,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, TextIO
 
 from baker.cli.bake_plan import BakePlan
+from baker.cli.flags import in_flags
 from baker.core.printable import printable
 from baker.core.stage import COMPILING, Stage
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 
 # Shortest time between two lines, seconds, so that the log of a long bake stays readable.
 PLAIN_INTERVAL = 3.0
+# Shortest time between two equal lines about compiling, seconds.
+COMPILING_INTERVAL = 30.0
 
 
 class Reporter:
@@ -55,6 +58,10 @@ class Reporter:
         self._bar: RichProgress | None = None
         self._task: Any = None
         self._plan: BakePlan | None = None
+        # What the last line said about compiling.
+        self._words = ""
+        # The messages of `note`.
+        self.noted: list[str] = []
 
     def __enter__(self) -> Reporter:
         if not self._quiet and self._stream.isatty():
@@ -76,6 +83,18 @@ class Reporter:
             with self._lock:
                 self._show(stage, min(max(fraction, 0.0), 1.0), printable(detail))
         return self._stopped()
+
+    def note(self, message: str) -> None:
+        """Write a message above the bar."""
+        if not self._quiet:
+            line = f"warning: {printable(in_flags(message))}"
+            with self._lock:
+                if self._bar is not None:
+                    self._bar.console.print(line, markup=False, highlight=False)
+                else:
+                    self._stream.write(f"{line}\n")
+                    self._stream.flush()
+            self.noted.append(message)
 
     def follow(self, plan: BakePlan) -> None:
         """Show the progress of a whole bake from now on, instead of that of each stage."""
@@ -100,8 +119,9 @@ class Reporter:
         if self._bar is not None:
             shown = "" if left is None else f"{_duration(left)} left"
             self._bar.update(self._task, completed=share, detail=words, left=shown)
-        elif now - self._last_line >= PLAIN_INTERVAL:
+        elif now - self._last_line >= (COMPILING_INTERVAL if words == self._words else PLAIN_INTERVAL):
             self._last_line = now
+            self._words = words if compiling else ""
             shown = "" if left is None else f"{left:.0f} s left"
             self._write_line([f"bake: {100 * share:.0f} %", words, shown])
 

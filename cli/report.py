@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import shutil
 import textwrap
+from collections.abc import Collection
 from typing import TYPE_CHECKING, Any, TextIO
 
 from baker.cli.flags import in_flags
@@ -22,7 +23,9 @@ def bake_json(result: BakeResult) -> dict[str, Any]:
     return {"out": None if result.out is None else str(result.out), **{key: manifest[key] for key in KEYS}}
 
 
-def write_summary(result: BakeResult, stream: TextIO, *, verbose: int = 0) -> None:
+def write_summary(
+    result: BakeResult, stream: TextIO, *, verbose: int = 0, noted: Collection[str] = ()
+) -> None:
     """Write files and exports, the duration of each stage, the warnings, and the commands to run next.
 
     On a terminal, lines are wrapped between words. Elsewhere each message is one line.
@@ -35,6 +38,8 @@ def write_summary(result: BakeResult, stream: TextIO, *, verbose: int = 0) -> No
         Stream to write to.
     verbose : int
         If 1 or more, statistics and numbers of rays are written as well.
+    noted : collection of str
+        Messages of warnings that have been written before the bake.
     """
     manifest: dict[str, Any] = result.manifest
     if result.out is not None:
@@ -57,6 +62,8 @@ def write_summary(result: BakeResult, stream: TextIO, *, verbose: int = 0) -> No
         rays = ", ".join(f"{stage} {count:,}" for stage, count in manifest["rays"].items())
         _write_line(f"rays: {rays}", stream)
     for warning in manifest["warnings"]:
+        if warning["message"] in noted:
+            continue
         where = f"{warning['object']}: " if warning.get("object") else ""
         _write_line(f"warning: {where}{warning['message']} [{warning['code']}]", stream)
     if result.out is not None:

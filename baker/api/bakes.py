@@ -50,7 +50,7 @@ def bake(
         Settings by name, which replace those in `settings`:
 
         channels : str | Sequence[str], default ('irradiance', 'ao')
-            Channels to bake.
+            Channels to bake. Default for a scene without light: ao.
         resolution : int, texels, 16 to 16384, default 1024
             Width and height of each page.
         density : float | None, texels/m, above 0, default None

@@ -13,7 +13,7 @@ from typing import Literal, TypedDict
 class BakeKeywords(TypedDict, total=False):
     """Keywords of `BakeSettings`."""
 
-    # Channels to bake.
+    # Channels to bake. Default for a scene without light: ao.
     channels: str | Sequence[str]
 
     # Width and height of each page.

@@ -172,6 +172,12 @@ class CheckContext:
         return tuple(chosen_channels(self.settings.channels).values())
 
     @property
+    def lit(self) -> bool:
+        """Return whether a light without area or the sky emits light."""
+        bright = [max(light.intensity) for light in self.scene.lights]
+        return max([*bright, *self.settings.sky_radiance], default=0.0) > 0
+
+    @property
     def bakes_light(self) -> bool:
         """Return whether a channel to be baked needs light."""
         return any(channel.needs_light for channel in self.channels)
@@ -201,9 +207,7 @@ class CheckContext:
 
         None if the scene has no light or no surface, or if only ambient occlusion is baked.
         """
-        bright = [max(light.intensity) for light in self.scene.lights]
-        lit = max([*bright, *self.settings.sky_radiance], default=0.0) > 0
-        if not self.bakes_light or not (lit or self.emits) or not self.world.area.sum() > 0:
+        if not self.bakes_light or not (self.lit or self.emits) or not self.world.area.sum() > 0:
             return None
         return estimate_levels(self.scene, self.world, self.emission, self.settings)
 

@@ -35,6 +35,21 @@ def silent(stage: str, fraction: float, detail: str = "", /) -> object:
     return None
 
 
+def notify(progress: Progress, message: str) -> None:
+    """Pass on a message that the user should read before the work goes on.
+
+    Parameters
+    ----------
+    progress : Progress
+        A callback with a method `note`, which receives the message. Other callbacks get nothing.
+    message : str
+        One sentence.
+    """
+    note = getattr(progress, "note", None)
+    if note is not None:
+        note(message)
+
+
 def report(progress: Progress, stage: Stage, fraction: float, detail: str = "") -> None:
     """Call `progress`, and raise `Cancelled` if it returns a truthy value.
 

@@ -37,7 +37,9 @@ class CommonSettings(Settings):
 
     table: ClassVar[str] = "bake"
 
-    channels: Names = setting(("irradiance", "ao"), "Channels to bake.", group=FILES)
+    channels: Names = setting(
+        ("irradiance", "ao"), "Channels to bake. Default for a scene without light: ao.", group=FILES
+    )
     resolution: int = setting(
         1024, "Width and height of each page.", unit="texels", ge=16, le=16384, group=BAKE
     )

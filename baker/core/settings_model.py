@@ -208,7 +208,22 @@ class Settings(BaseModel):
         Settings
             An object of the same class.
         """
-        return type(self)(**{**{name: getattr(self, name) for name in type(self).model_fields}, **values})
+        return type(self)(**{**{name: getattr(self, name) for name in self.model_fields_set}, **values})
+
+    def is_given(self, name: str) -> bool:
+        """Return whether a setting was given, even if its value is the default.
+
+        Parameters
+        ----------
+        name : str
+            Name of the setting.
+
+        Returns
+        -------
+        bool
+            False if the setting has its default because it was left out.
+        """
+        return name in self.model_fields_set
 
 
 def seed_setting() -> Any:

@@ -153,7 +153,9 @@ class _Worker:
         self.listener.start()
 
     def begin(self, job: Job, *, threads: int, force: bool) -> None:
-        settings = job.settings.model_dump(mode="json", exclude_none=True) | {"threads": threads}
+        settings = job.settings.model_dump(mode="json", exclude_none=True, exclude_unset=True) | {
+            "threads": threads
+        }
         task = {"scene": os.fspath(job.scene), "out": str(job.out), "settings": settings, "force": force}
         assert self.process.stdin is not None
         # If the process has died, writing fails, and the listening thread reports the death.

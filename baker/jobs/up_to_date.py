@@ -72,7 +72,9 @@ def check_output(out: Path, sha256: str, settings: BakeSettings) -> Freshness:
         found = _differences(manifest["versions"], library_versions())
         if manifest["input"]["sha256"] != sha256:
             found.append("the scene, or a file that it names, changed")
-        found += _differences(manifest["settings"], resolved_settings(settings))
+        found += _differences(
+            manifest["settings"], _as_baked(resolved_settings(settings), settings, manifest)
+        )
         for entry in [] if found else manifest["files"]:
             state = file_state(out / str(entry["file"]), str(entry["sha256"]))
             if state != AS_BAKED:
@@ -84,6 +86,14 @@ def check_output(out: Path, sha256: str, settings: BakeSettings) -> Freshness:
         return Freshness(True, "nothing changed", data)
     more = f"; and {len(found) - _TOLD} more" if len(found) > _TOLD else ""
     return Freshness(False, "; ".join(found[:_TOLD]) + more, data)
+
+
+def _as_baked(values: dict[str, Any], settings: BakeSettings, manifest: dict[str, Any]) -> dict[str, Any]:
+    """Return the resolved settings `values` with the channels that a bake chose for a scene without light."""
+    dark = any(warning["code"] == "no-light" for warning in manifest["warnings"])
+    if dark and not settings.is_given("channels"):
+        return {**values, "channels": manifest["settings"]["channels"]}
+    return values
 
 
 def _differences(before: dict[str, Any], now: dict[str, Any]) -> list[str]:

@@ -21,7 +21,7 @@ from baker.core.export import check_exports
 from baker.core.light_limits import check_brightness
 from baker.core.lightmap import BakeResult
 from baker.core.precision import coarse_warnings
-from baker.core.progress import Progress, silent
+from baker.core.progress import Progress, notify, silent
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
@@ -31,6 +31,7 @@ from baker.io.protected_files import check_outputs
 from baker.kernels.not_kept import cache_warnings
 from baker.pipeline import precompile
 from baker.pipeline.memory_check import check_memory
+from baker.pipeline.no_light import fit_to_light
 from baker.pipeline.pages import TracedTexels, finish_pages
 from baker.pipeline.prepare import prepare_scene
 from baker.pipeline.record import Record
@@ -92,6 +93,11 @@ def bake(
         scene = _load(scene, settings, record)
         if atlas is not None:
             settings = settings_of_atlas(scene, atlas, settings)
+        settings, dark = fit_to_light(scene, settings)
+        if dark is not None:
+            notify(progress, dark.message)
+            record.warnings.append(dark)
+            channels = chosen_channels(settings.channels)
         if not force:
             check_memory(scene, settings, channels)
         compiling = precompile.restart_for_materials(compiling, scene)

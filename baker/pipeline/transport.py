@@ -12,7 +12,6 @@ from baker.channels.channel import Channel, Transport
 from baker.core.budget import patch_rays
 from baker.core.executor import LocalTileExecutor, TileExecutor
 from baker.core.parallel import TileRunner
-from baker.core.scene import SceneWarning
 from baker.core.stage import Stage
 from baker.pipeline.prepare import PreparedScene
 from baker.pipeline.record import Record
@@ -70,11 +69,7 @@ def trace_transport(
 
 def _light(prepared: PreparedScene, record: Record, executor: TileExecutor) -> Transport:
     """Return the result of direct light, radiosity and final gather."""
-    texels, sky = prepared.texels, np.array(prepared.settings.sky_radiance)
-    if not prepared.scene.lights and not len(prepared.emitters.power) and not sky.any():
-        record.warnings.append(
-            SceneWarning("no-light", "nothing emits light: the irradiance is black; add a light or use `sky`")
-        )
+    texels = prepared.texels
     with record.stage(Stage.DIRECT_LIGHT):
         direct = trace_direct_light(
             prepared, executor.runner(Stage.DIRECT_LIGHT, {"outside": prepared.outside})

@@ -488,12 +488,13 @@ def test_compiling_is_labelled_and_does_not_spoil_the_estimate():
     expected = {"load": 1.0, "texels": 1.0, "gather": 8.0}
     lines = plan_lines(
         [(1, "load", 0.0, ""), (4, "texels", 0.0, COMPILING), (40, "compile", 0.5, COMPILING),
-         (44, "gather", 0.0, "")],
+         (44, "compile", 0.5, COMPILING), (48, "gather", 0.0, "")],
         expected,
     )  # fmt: skip
     assert lines[0] == "bake: 10 %  texels  compiling kernels, first run only"
     assert lines[1] == "bake: 10 %  compiling kernels, first run only"
     assert 8 <= float(re.search(r"(\d+) s left", lines[2])[1]) < 20
+    assert len(lines) == 3
 
 
 @pytest.mark.parametrize("width", [40, 80])

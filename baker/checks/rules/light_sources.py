@@ -33,11 +33,14 @@ FLOOR = 0.5
     fix="add a light or an emissive material, or bake with `sky`; for AO alone use `channels='ao'`",
 )
 def no_light(context: CheckContext) -> Iterator[RawFinding]:
-    """A scene without any light, emissive surface or sky: its irradiance is black."""
-    lit = any(max(light.intensity) > 0 for light in context.scene.lights)
-    dark = not lit and not any(context.settings.sky_radiance) and context.bakes_light
-    if dark and not context.emits:
-        yield RawFinding("nothing emits light: the irradiance will be black")
+    """A scene without any light, emissive surface or sky.
+
+    A bake then writes ambient occlusion only. If `channels` names channels of light, their maps are black.
+    """
+    if context.bakes_light and not context.lit and not context.emits:
+        given = context.settings.is_given("channels")
+        effect = "the maps of light will be black" if given else "a bake writes ambient occlusion only"
+        yield RawFinding(f"nothing emits light: {effect}")
 
 
 @check(

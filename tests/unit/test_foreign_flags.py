@@ -1,0 +1,58 @@
+"""Flags of other bakers: the answer is a flag with the same purpose or a section of docs/LIMITS.md."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from baker.cli.app import run
+from baker.cli.bake import bake
+from baker.cli.foreign_flags import LIMITED, SAME
+
+DOCS = Path(__file__).parents[2] / "docs"
+KNOWN = {name for option in bake().params for name in (*option.opts, *option.secondary_opts)}
+
+
+def said(*words):
+    out = io.StringIO()
+    assert run([*words, "--json"], out=out) == 2
+    return json.loads(out.getvalue())["error"]["message"]
+
+
+@pytest.mark.parametrize(
+    ("flag", "words"),
+    [
+        ("--gpu", "see 'CPU only' in docs/LIMITS.md"),
+        ("--hdri=sky.hdr", "see 'A sky of one colour' in docs/LIMITS.md"),
+        ("--probes", "see 'No probes' in docs/LIMITS.md"),
+        ("--directional", "see 'One value per texel' in docs/LIMITS.md"),
+        ("--denoiser", "use --denoise;"),
+        ("--texel_density", "use --density;"),
+        ("--spp", "use --samples;"),
+        ("--use-gpu", "see 'CPU only'"),
+    ],
+)
+def test_a_flag_of_another_baker_is_answered_by_its_purpose(flag, words):
+    message = said("bake", "a.glb", "-o", "x", flag)
+    assert words in message
+    assert flag.partition("=")[0] in message
+
+
+def test_a_flag_that_the_command_lacks_is_not_recommended():
+    assert "--samples" not in said("inspect", "a.glb", "--rays")
+    assert "--resolution" in said("bake", "a.glb", "-o", "x", "--resolutio")
+
+
+def test_the_lists_name_flags_and_sections_that_exist():
+    assert set(SAME) <= KNOWN
+    titles = re.findall(r"^## (.+)$", (DOCS / "LIMITS.md").read_text("utf-8"), re.MULTILINE)
+    assert [title for title in titles if title != "Numbers"] == list(LIMITED)
+    names = [name for lists in (SAME, LIMITED) for names in lists.values() for name in names]
+    assert len(set(names)) == len(names)
+    assert not {f"--{name}" for name in names} & KNOWN
+    for flag in re.findall(r"`(--[a-z-]+)", (DOCS / "LIMITS.md").read_text("utf-8")):
+        assert flag in KNOWN, flag
