@@ -66,8 +66,8 @@ def test_nothing_is_said_about_a_sky_or_ambient_occlusion(dark, values):
 
 def test_nothing_is_said_about_a_scene_with_light(dark, lit):
     assert chosen(lit) == (("irradiance", "ao"), None)
-    glowing = replace(dark, materials=tuple(replace(m, emission=(1.0, 0.0, 0.0)) for m in dark.materials))
-    assert chosen(glowing) == (("irradiance", "ao"), None)
+    emissive = replace(dark, materials=tuple(replace(m, emission=(1.0, 0.0, 0.0)) for m in dark.materials))
+    assert chosen(emissive) == (("irradiance", "ao"), None)
     assert chosen(dark, sky="1", sky_strength=0.0)[0] == ("ao",)
 
 
