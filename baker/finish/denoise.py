@@ -6,8 +6,8 @@
 3. The change of each texel is limited by the standard error of its samples, see
    `baker.finish.kernels.page_guard`.
 
-Direct and indirect light are denoised separately and then added. *Measured* RMS error at a sharp shadow edge
-of direct light, with noisy indirect light:
+Direct and indirect light are denoised separately and then added. *Measured* RMS error of a page with a sharp
+shadow edge in direct light, and with noisy indirect light:
 
     noise of direct and of indirect light | texels        | denoised as a sum | denoised separately
     0 and 5 %                             | all           | 1.5 %             | 0.9 %

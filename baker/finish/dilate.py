@@ -1,8 +1,8 @@
 """Fills empty texels around charts, so that bilinear lookups and mip levels do not read empty texels.
 
 Values are extrapolated with a plane fitted at the chart's border, by weighted least squares in a window of 5
-x 5 texels. They are limited to a range around the values in that window. A lookup between the last covered
-texel and the first empty texel therefore continues the gradient.
+x 5 texels. The extrapolated values are limited to a range around the values in that window. A lookup between
+the last covered texel and the first empty texel therefore continues the gradient.
 
 *Measured* RMS error of lookups within half a texel of the border, on charts with slanted borders that darken
 over the last 6 texels (`recentre` is in `finish.texel_centre`):

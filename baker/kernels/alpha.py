@@ -1,4 +1,4 @@
-"""Opacity of MASK and BLEND triangles.
+"""Computes the opacity of MASK and BLEND triangles.
 
     alpha = factor * texture alpha * vertex alpha
 

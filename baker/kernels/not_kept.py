@@ -1,4 +1,4 @@
-"""The warning for installations that cannot store compiled kernels for the next run."""
+"""Warns if this installation cannot store compiled kernels for the next run."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Rays from the sample points of texels that find the points inside geometry."""
+"""Casts rays from the sample points of texels to find the points inside geometry."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Low-discrepancy points in the unit square, and maps from it to directions and triangles.
+"""Generates low-discrepancy points in the unit square, and maps them to directions and triangles.
 
 The points are the first two Sobol dimensions (a (0,2)-sequence) with nested uniform (Owen) scrambling. The
 leading bits (`shared_bits_mask`) are scrambled in the same way for all texels, the other bits differently for

@@ -1,4 +1,4 @@
-"""Material textures for kernels: mip pyramids in one flat array, with bilinear or nearest lookups.
+"""Packs material textures into mip pyramids in flat arrays, and looks textures up in kernels.
 
 The levels of a pyramid are averages of linear colours.
 Based on: Williams, Pyramidal parametrics, 1983; IEC 61966-2-1 (the sRGB curve).

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Transmittance of BLEND surfaces along rays, for R, G and B.
+"""Computes the transmittance of BLEND surfaces along rays, for R, G and B.
 
     T = (1 - a) lerp(1, c, a)                           a: alpha
     c = clamp(factor * texture * vertex colour, 0, 1)   colour of the surface

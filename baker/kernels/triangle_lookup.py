@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""The triangle table of a bake, and the lookup from a hit to a lightmap texel.
+"""Defines the triangle table of a bake, and finds the lightmap texel of a hit.
 
 The table has one cache line (64 bytes) per triangle.
 

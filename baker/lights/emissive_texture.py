@@ -1,8 +1,8 @@
-"""Textured emission: divides triangles into parts of low variance, with exact mean radiance.
+"""Divides triangles of textured emission into parts of low variance, with exact mean radiance.
 
 A triangle is cut at the midpoints of its edges into four parts. The parts that cause most noise are cut
-again. Black parts are dropped. Uniformly distributed points of the remaining parts are then samples of low
-variance. The noise of a triangle is
+again. Black parts are dropped. The radiance at uniformly distributed points of a remaining part then has a
+low variance. The noise of a triangle is
 
     noise = sum share (E[L^2] / E[L]^2 - 1)
 

@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 from baker.kernels.textures import wrapped
 from baker.trace.jit import inner, kernel, larger, scratch, smaller
 
-# Distance, texels, between the stored running sums of a row. Sums at other texels are computed on demand from
-# these.
+# Distance, texels, between the stored running sums of a row. Sums at other texels are computed from the
+# stored sums on demand.
 BLOCK = 32
-# Number of columns of f: red, green, blue, and the weighted sum of their squares.
+# Number of components of f: red, green, blue, and the weighted sum of their squares.
 N_SUMS = 4
 # Limit of area / (longest edge)^2 of a triangle. Up to this limit, the triangle is treated as degenerate: it
 # is integrated along its longest edge.
@@ -32,8 +32,8 @@ _THIN = 1.0e-9
 # Limit of the largest side of a triangle's uv bounding box, texels. Up to this limit, the spread of a
 # bilinear texture is estimated from sixteen points.
 _FEW_CELLS = 3.0
-# Limit of integral / (sum of the magnitudes of its terms). Up to this limit, an integral is treated as
-# rounding error and set to 0.
+# Limit of |integral| divided by the sum of the magnitudes of its terms. Up to this limit, an integral is
+# treated as rounding error and set to 0.
 _ROUNDING = 1.0e-12
 # Spread (variance / mean^2) that a triangle gets if its mean is positive but the texture is black at all
 # sixteen points.

@@ -2,7 +2,7 @@
 
 A group is the set of points of an object, a chart or another region. Its deviations are ratios of sums over
 the group. The value of a single point is known to a few percent, and the mean of a hundred points ten times
-better. Deviations of a whole group are therefore detected far below the noise of single texels.
+more accurately. Deviations of a whole group are therefore detected far below the noise of single texels.
 
 For the n points of a group, v_c and r_c are the value and the reference value of colour c, and v and r their
 means over colours. V, R, V_c and R_c are the sums of v, r, v_c and r_c over the group.
@@ -13,25 +13,26 @@ means over colours. V, R, V_c and R_c are the sums of v, r, v_c and r_c over the
     typical    median of |v - r| / max(r, floor), with the floor `dark_floor` of the group
     noise      median of |d| / max(r, floor), where d is half the difference of two halves of the reference
 
-A deviation is reported after `z_needed(m)` of its standard errors are subtracted from its absolute value. m
-is the effective number of points, (sum w)^2 / sum w^2 with w = v + r. If m is below `MIN_POINTS`, no
-deviation is significant.
+Before a deviation is reported, its absolute value is reduced by `z_needed(m)` times its standard error. m is
+the effective number of points, (sum w)^2 / sum w^2 with w = v + r. If m is below `MIN_POINTS`, no deviation
+is significant.
 
 The standard error of bias and colour is the largest of these:
 
 - the standard error of the jackknife, from the change if one point is left out. This error contains the noise
   of bake and reference, and is large if one bright point dominates;
 - for the bias, the standard error of the reference alone;
-- half the difference of the results of two halves of the reference.
+- half the difference between the two deviations that result if only one half of the reference is used.
 
 The noise of colour shifts is small, because the colours of a path are correlated.
 
-If the rms noise of a group's reference exceeds `_UNRELIABLE` of its mean light, the lower bound of its own
-error is set to 0. Light of rare paths is then missing at most points and too strong at a few.
+If the rms noise of a group's reference exceeds the share `_UNRELIABLE` of the group's mean light, the lower
+bound of the own error is set to 0. The reason is that the light of rare paths is then missing at most points,
+and too strong at a few points.
 
-The bright light of a scene is the 95th percentile of its reference values. If the reference of a group is
-below three of its standard errors, differences are relative to at least a thousandth of the bright light. The
-standard error then includes one missed path that carries the bright light.
+The bright light of a scene is the 95th percentile of its reference values. If the summed reference of a group
+is less than three times the standard error of this sum, differences are relative to at least a thousandth of
+the bright light. The standard error then includes one missed path that carries the bright light.
 
 Based on: Cochran, Sampling Techniques, 1977, chapter 6; Efron, The jackknife, the bootstrap and other
 resampling plans, 1982.
@@ -57,7 +58,8 @@ _Z, _Z_FEW = 3.0, 32.0
 _MIN_COLOUR_SHARE = 0.3
 # Lower limit of the denominator of differences if the reference is black, as a share of the bright light.
 _BLACK = 1.0e-3
-# The reference of a group counts as black if its sum is below this many of its standard errors.
+# The reference of a group counts as black if its sum is below this number times the standard error of the
+# sum.
 _LIT = 3.0
 # Relative rms noise of the reference above which the lower bound of the own error is 0.
 _UNRELIABLE = 0.4

@@ -4,7 +4,7 @@ A group has n points with values v, reference values r, and standard errors s of
 c = max((v + r) / 2, floor), and let a be the median of (v - r) / c, weighted by 1 / max(s / c, 0.02). The own
 error b is the solution of
 
-    mean psi((v - r - a c)^2 / (b^2 c^2 + (f s)^2)) = E psi(z^2)      psi(x) = min(x, 4), z normal
+    mean psi((v - r - a c)^2 / (b^2 c^2 + (f s)^2)) = E psi(t^2)      psi(x) = min(x, 4), t normal
 
 where the mean is over the points, and E is the expectation. If the errors of values and reference are normal,
 b^2 is the relative variance of the values about the truth. If the noise of the reference explains all
@@ -12,16 +12,16 @@ differences, b is 0. Points with more noise have smaller weights. Because psi is
 errors, such as those at shadow edges and at entrances of gaps, count only as errors of two standard
 deviations.
 
-The common shift a of all points is part of the bias and not of b. (In a group that is lit by rare paths, most
-points lack such a path. All of them have the same negative error, the light of these paths.)
+The common shift a of all points is part of the bias and not of b. (If rare paths light a group, most points
+receive no such path. All these points have the same negative error, the missing light.)
 
 s is estimated from the passes of the reference. The factor f, at least 1, corrects s. f is the solution of
 the same equation with b = 0 and a = 0. In this equation, v - r is replaced by half the difference of two
 halves of the reference.
 
 psi is bounded, so the mean of psi over n points has a finite standard error for any distribution of the
-errors. The lower and upper bounds of b solve the equation with z of these standard errors subtracted from, or
-added to, the mean of psi.
+errors. The lower and upper bounds of b solve the equation after z times this standard error is subtracted
+from, or added to, the mean of psi.
 
 Based on: Huber and Ronchetti, Robust Statistics, 2009, chapter 5 (M-estimators of scale).
 """
@@ -34,7 +34,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-# Bound of psi, and the expectation E psi(z^2) for a standard normal z.
+# Bound of psi, and the expectation E psi(t^2) for a standard normal t.
 _PSI_BOUND = 4.0
 _EXPECTED = (
     math.erf(math.sqrt(_PSI_BOUND / 2))

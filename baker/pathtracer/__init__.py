@@ -1,4 +1,4 @@
-"""The reference: irradiance, ambient occlusion and pictures by path tracing.
+"""Computes the reference of bakes, and pictures: irradiance, ambient occlusion and radiance by path tracing.
 
 Bakes are verified against this package, so it computes light without the bake's code. The bake and this
 package share:

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Bidirectional path tracing: subpaths from lights and from the eye, with all connections between them.
+"""Traces paths bidirectionally: subpaths from lights and from the eye, with all connections between them.
 
 The eye is a camera or a surface point. Each sample traces a subpath from a light and stores its vertices,
 then traces a subpath from the eye. Every eye vertex is connected to a sampled light and to all stored

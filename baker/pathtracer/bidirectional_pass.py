@@ -1,8 +1,9 @@
-"""Passes of the bidirectional estimator: tiles of surface points, and pictures with their splats.
+"""Runs passes of the bidirectional estimator: tiles of surface points, and pictures with their splats.
 
 A picture is divided into blocks, and a block into tiles. A splat (see `bidirectional`) may be in any pixel,
-so each tile returns a list of its splats. After each block, the lists are added to the picture, which limits
-memory. They are added in the order of tiles, so that sums do not depend on the number of threads.
+so each tile returns a list of its splats. After each block, the lists are added to the picture, so that
+memory is limited. The lists are added in the order of tiles, so that sums do not depend on the number of
+threads.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""MIS weights of `bidirectional`: densities of all techniques relative to the technique used.
+"""Computes MIS weights of `bidirectional`, from densities of all techniques relative to the technique used.
 
 Let a path have vertices x_0 (on the light) to x_k-1 (at the eye). Technique s samples s of the vertices from
 the light and k - s from the eye. Its density is p_s, and its weight by the balance heuristic is w_s:

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""The BSDFs: Lambert, and glTF's metallic-roughness model, whose specular lobe may be a mirror.
+"""Evaluates and samples BSDFs: Lambert, and glTF's metallic-roughness model with a GGX or mirror lobe.
 
     f = c_diff (1 - F) / pi + F D V        c_diff = base (1 - metallic), F0 = mix(0.04, base, metallic)
     D = a^2 / (pi ((n.h)^2 (a^2 - 1) + 1)^2)      a = roughness^2

@@ -1,4 +1,4 @@
-"""A pinhole camera: rays through its pixels, and the parser of its text form."""
+"""Computes rays through the pixels of a pinhole camera, and parses the text form of a camera."""
 
 from __future__ import annotations
 

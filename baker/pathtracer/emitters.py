@@ -1,10 +1,10 @@
 """Finds the emissive triangles of a scene, for the path tracer.
 
-This module does not use `lights.emissive.build_emitters`. So an emitter that the bake misses by a mistake
-there is still in the reference. From the resolved materials, this module computes which triangles emit, and
-their area, radiance, sides and power. `lights.emissive_texture.cut` divides triangles with an emissive
-texture into parts. The parts affect sampling densities only, because the radiance of a point is looked up in
-the material.
+This module does not use `lights.emissive.build_emitters`. So if `build_emitters` misses an emitter by
+mistake, the reference still contains this emitter. From the resolved materials, this module computes which
+triangles emit, and their area, radiance, sides and power. `lights.emissive_texture.cut` divides triangles
+with an emissive texture into parts. The parts affect sampling densities only, because the radiance of a point
+is looked up in the material.
 
     power = pi area L, twice that if two-sided
 

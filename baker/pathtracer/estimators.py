@@ -1,4 +1,4 @@
-"""Estimators of the rendering equation by name, with their ways to sample directions and lights.
+"""Defines the estimators of the rendering equation: how each estimator samples directions and lights.
 
 With `uniform`, `cosine`, `stratified` and `bsdf`, paths hit emitters and the sky at random. `light` samples a
 light at every vertex. `mis` and `mis-power` combine both techniques by multiple importance sampling. `bdpt`

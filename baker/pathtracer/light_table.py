@@ -1,14 +1,15 @@
-"""The table of all lights that paths sample: emitters, lights without area, and the sky.
+"""Builds the table of all lights that paths sample: emitters, lights without area, and the sky.
 
 Each light is chosen with a fixed probability. Half of the total probability is distributed in proportion to
 power. The other half is divided equally among groups. All emitters together are one group, each light without
-area is a group, and the sky is one. So weak lights get enough samples beside a strong light such as the sun.
-Each estimate is divided by the probability of its light, so that its expectation does not depend on the
+area is a group, and the sky is a group. So weak lights get enough samples beside a strong light such as the
+sun. Each estimate is divided by the probability of its light, so that its expectation does not depend on the
 probabilities.
 
 The modules of `baker.lights.kinds` describe lights without area as `EmissionProfile`s. Kernels distinguish
 four forms of profile: even, cone, parallel and tabulated. A tabulated profile is a table of fall-off values,
-which the kernels interpolate. It can express any fall-off, so new kinds of light need no change in this file.
+which the kernels interpolate. Such a table can express any fall-off, so new kinds of light need no change in
+this file.
 
 Based on: Shirley, Wang and Zimmerman, Monte Carlo techniques for direct lighting calculations, 1996;
 KHR_lights_punctual.

@@ -1,4 +1,4 @@
-"""Blocks of eight paths: the memory layout of all paths of a tile.
+"""Defines the memory layout of all paths of a tile: blocks of eight paths.
 
 A block is a ray packet of width 8, followed by further rows of eight numbers. A lane is one column of a block
 and holds one path. Rays are traced and shaded in place. All rows are at constant offsets in one array, for

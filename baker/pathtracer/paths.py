@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Path tracing in blocks of eight paths. New paths replace ended ones, so that ray packets stay full.
+"""Traces paths in blocks of eight. New paths replace ended paths, so that ray packets stay full.
 
     L = L_e + integral f L cos
 

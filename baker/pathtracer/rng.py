@@ -1,4 +1,4 @@
-"""Random numbers of paths, which depend only on seed, pass, point, sample and number of the vertex.
+"""Generates random numbers of paths, which depend only on seed, pass, point, sample and number of the vertex.
 
 `draw` returns the next number of a SplitMix64 generator, whose state `path_state` computes from (seed, pass,
 point, sample). `random_lanes` hashes (seed, pass, point, sample, vertex) for eight paths at once. It

@@ -1,4 +1,4 @@
-"""A scene prepared for path tracing: triangles, materials, lights and the Embree scene, without an atlas."""
+"""Prepares a scene for path tracing: triangles, materials, lights and the Embree scene, without an atlas."""
 
 from __future__ import annotations
 

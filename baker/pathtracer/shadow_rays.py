@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Shadow rays, collected in packets by light. A packet is traced when it contains eight rays."""
+"""Collects shadow rays in packets by light, and traces each packet when it contains eight rays."""
 
 from __future__ import annotations
 

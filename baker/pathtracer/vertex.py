@@ -1,9 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Functions for one vertex of a path: set it up at a hit, sample a light, sample the next direction.
+"""Sets up a vertex of a path at a hit, samples a light from the vertex, and samples the next direction.
 
-Column `lane` of `path` is the state of one path, with the rows below. Column `lane` of `row` contains the
-BSDF parameters of the surface at the path's vertex (see `pathtracer.bsdf`). Directions in `path` are in world
-space, except `TO`, which is in the frame of the shading normal.
+Column `lane` of `path` is the state of one path, in the rows that this module defines. Column `lane` of `row`
+contains the BSDF parameters of the surface at the path's vertex (see `pathtracer.bsdf`). Directions in `path`
+are in world space, except `TO`, which is in the frame of the shading normal.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Shading of Lambertian vertices, eight paths at a time, in loops that the compiler vectorizes.
+"""Shades Lambertian vertices, eight paths at a time, in loops that the compiler vectorizes.
 
 These functions compute in float32 what `pathtracer.vertex` computes for one path in float64: vertices from
 hits, light samples, and the next directions. They use selections instead of branches.

@@ -2,7 +2,7 @@
 
     F_ij = share of the light leaving patch i that arrives at patch j
     A_i F_ij = A_j F_ji                         A: patch area
-    sum_j F_ij + sky_i + lost_i = 1    sky, lost: shares of rays that leave the scene, or end without a patch
+    sum_j F_ij + sky_i + lost_i = 1 sky, lost: shares of rays that leave the scene, or end at no patch
 
 Each F_ij is merged with its reciprocal estimate A_j F_ji / A_i. Merging changes the row sums. Therefore the
 matrix is then balanced: it is scaled so that its row sums are again close to the measured row sums. The

@@ -1,4 +1,4 @@
-"""The radiosity solve: the irradiance E of each patch from light reflected at least once, for R, G and B.
+"""Solves for the irradiance E of each patch from light that was reflected at least once, for R, G and B.
 
     E = F (s + rho E)        F: form factors, s: direct light that patches reflect, rho: albedo
 

@@ -1,4 +1,4 @@
-"""Arguments that all ray stages of a bake share."""
+"""Defines the arguments that all ray stages of a bake share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The passes of a picture, and the layers that are computed from first hits.
+"""Computes the passes of a picture, and the layers from first hits.
 
 A pass estimates the value of every pixel, and a picture is the mean of its passes. Pixels are computed in
 blocks, so that temporary memory does not grow with the picture.

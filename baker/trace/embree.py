@@ -1,4 +1,4 @@
-"""Embree's C API, loaded from the library in the `embreex` wheel.
+"""Loads Embree's C API from the library in the `embreex` wheel, and builds Embree scenes.
 
 Other files do not use Embree's functions and constants. `RayScene` owns the Embree device, its scenes and the
 vertex memory. Kernels receive integers: addresses of functions and of scenes.

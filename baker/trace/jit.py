@@ -3,8 +3,8 @@
 The first bake after an install compiles all kernels that it uses. These decorators and primitives avoid the
 following compile times, which were measured with Numba 0.68:
 
-- A wrapper that makes a function callable from Python takes 40 ms. Only `kernel` functions have a wrapper;
-  `inner` functions have none.
+- A wrapper that makes a function callable from Python takes 40 ms to compile. Only `kernel` functions have a
+  wrapper; `inner` functions have none.
 - Kernels and inner functions are compiled without reference counts, because Python owns all their arrays.
 - `np.zeros` compiles three functions in 0.2 s. `scratch` compiles none.
 - `min` and `max` compile a function for each combination of types, in 40 ms each. `smaller` and `larger`

@@ -1,4 +1,4 @@
-"""Ray packets in Numba kernels: memory layout, and calls through function addresses.
+"""Defines the memory layout of ray packets in Numba kernels, and calls Embree through function addresses.
 
 A packet of N rays is an array of 21 rows of N four-byte numbers: 12 rows for the rays and 9 rows for their
 hits, laid out as RTCRayHitN. Lane i is column i, which holds ray i. Kernels call Embree through integer

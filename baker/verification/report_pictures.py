@@ -1,4 +1,4 @@
-"""Pictures of the HTML report: maps, errors of the compared texels, and windows around the worst texels.
+"""Makes the pictures of the HTML report: maps, errors of compared texels, windows around the worst texels.
 
 Maps are shown as value / (value + middle), sRGB-encoded, where middle is the median of the reference over lit
 texels.
@@ -16,7 +16,7 @@ from baker.io.png import encode_png, srgb_levels
 from baker.metrics.error_metrics import dark_floor, relative_error
 from baker.verification.verify import ChannelCheck, VerifyReport
 
-# Side of the image of a page, texels: larger pages are subsampled.
+# Largest side of the image of a page, texels. Larger pages are subsampled.
 _SHOWN = 512
 # Relative error at the yellow end of the colour scale.
 _HOT = 0.10

@@ -1,4 +1,4 @@
-"""Plots of the HTML report as inline SVG: errors by light level, and the histogram of z-scores."""
+"""Draws the plots of the HTML report as inline SVG: errors by light level, and the histogram of z-scores."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _ERROR, _NOISE, _BIAS, _AXIS = "#b00020", "#999999", "#2b5f9e", "#555555"
 
 
 def level_plot(rows: list[dict[str, Any]]) -> str:
-    """Return a plot of errors against the light of each level, empty for fewer than two levels.
+    """Return a plot of the errors of light levels over their light; "" for fewer than two levels.
 
     Parameters
     ----------

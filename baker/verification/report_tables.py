@@ -1,4 +1,4 @@
-"""Tables of the HTML report: limits, figures with explanations, regions, worst texels and objects."""
+"""Makes the tables of the HTML report: limits, metrics, regions, worst texels and objects."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def _table(titles: tuple[str, ...], rows: str, *, wide: bool = False) -> str:
 
 
 def _meaning(name: str) -> str:
-    """Return a cell with the explanation of a figure."""
+    """Return a table cell with the explanation of a metric."""
     return f"<td class=words>{escaped(FIGURES[name].phrase) if name in FIGURES else ''}</td>"
 
 
@@ -69,7 +69,7 @@ def regions_table(found: VerifyReport) -> str:
 
 
 def figures_table(found: VerifyReport) -> str:
-    """Return all figures of all channels, each with its meaning."""
+    """Return all metrics of all channels, each with its explanation."""
     # Write one row for each metric, because a column for each metric would be too wide.
     rows = ""
     for key in (*METRIC_NAMES, "unresolved", "flip"):

@@ -6,8 +6,9 @@ gaps are used only for the metrics over all texels.
 
 A room is a set of points that are visible from one point in the air. Points in the air are midpoints of rays
 between surfaces. The point in the air from which most points are visible defines the first room. The point
-from which most of the remaining points are visible defines the second room, and so on. This separates closed
-rooms. It also separates rooms with open doors, except for the surface that is visible through the door.
+from which most of the remaining points are visible defines the second room, and so on. This rule separates
+closed rooms. The rule also separates rooms with open doors, except for the surface that is visible through
+the door.
 """
 
 from __future__ import annotations

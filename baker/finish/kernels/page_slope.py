@@ -2,7 +2,7 @@
 """Kernels that fit planes to windows of a lightmap page, and extrapolate values along these planes.
 
 The plane at a texel is a weighted least-squares fit to the covered texels of the same chart in a window
-around it. The position of each value is the centroid of the covered part of its texel.
+around the texel. The position of each value is the centroid of the covered part of its texel.
 """
 
 from __future__ import annotations

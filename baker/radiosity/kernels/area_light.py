@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Irradiance of texels from emissive triangles: shadow rays to sampled points, weighted for MIS.
+"""Computes the irradiance of texels from emissive triangles, with shadow rays to sampled points and MIS.
 
     E = 1/n sum L cos / (p_light + (n_hemisphere / n) p_cosine)
 

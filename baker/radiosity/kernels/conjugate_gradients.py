@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""One step of the conjugate gradient solver of the radiosity equation, for three colours at once.
+"""Computes one step of conjugate gradients for `radiosity.solve`, for three colours at once.
 
 Based on: Saad, Iterative methods for sparse linear systems, 2003, algorithm 9.1.
 """

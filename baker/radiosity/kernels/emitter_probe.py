@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Shadow rays that estimate which clusters of emitters are visible from the texels of a tile."""
+"""Casts shadow rays to find which clusters of emitters are visible from the texels of a tile."""
 
 from __future__ import annotations
 

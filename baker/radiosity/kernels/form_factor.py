@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Form factors of patches from cosine-weighted rays, and operations on the form-factor matrix.
+"""Estimates form factors of patches with cosine-weighted rays, and multiplies and balances their matrix.
 
     F_ij = share of the light leaving patch i that arrives at patch j
          = share of the cosine-weighted rays of patch i that hit patch j

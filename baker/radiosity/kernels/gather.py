@@ -1,12 +1,12 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Final gather: irradiance and ambient occlusion of texels from n cosine-weighted rays each.
+"""Computes irradiance and ambient occlusion of texels for the final gather, from n rays of each texel.
 
     E_indirect = pi / n sum M / pi            M: radiosity of the texel at the ray's hit, without emission
     E_sky      = pi / n sum L_sky         over rays that leave the scene, L_sky: radiance
     E_emitted  = sum of MIS-weighted hits of emitters, if `area_light` did not use the closed form
     AO         = share of rays without a hit within a distance
 
-The sums are over the n rays of a texel.
+The sums are over the n rays of a texel, whose directions are cosine-weighted.
 
 Based on: Reichert, A two-pass radiosity method driven by lights and viewer position, 1992;
 Christensen, Faster photon map global illumination, 1999.

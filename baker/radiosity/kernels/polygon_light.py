@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Unoccluded irradiance from triangles of uniform radiance, in closed form.
+"""Computes the unoccluded irradiance from triangles of uniform radiance, in closed form.
 
     E = L / 2 |sum_i angle_i Gamma_i . n|
 

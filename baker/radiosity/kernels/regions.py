@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Regions of charts: connected components of the graph that links neighbouring texels (`radiosity.sides`)."""
+"""Finds regions of charts: connected components of the graph of linked texels, see `radiosity.sides`."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Irradiance of texels from a light without area, with one shadow ray from each point."""
+"""Computes the irradiance of texels from a light without area, with one shadow ray from each point."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""The table of split texels, and the search for the side of a split texel on which a hit lies.
+"""Defines the table of split texels, and finds the side of a split texel on which a hit lies.
 
 Another surface divides a split texel into sides, and each of the texel's 16 points lies on one side
 (`radiosity.sides`). A hit gets the side of the nearest point that is visible from a position on the ray

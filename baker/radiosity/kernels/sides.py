@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Texels with points on both sides of another surface that passes through them.
+"""Finds texels that another surface passes through, and groups their points by side.
 
 For example, a floor that continues under a wall has texels with points on both sides of the wall. Two points
 of a texel are on the same side if a segment between them is not blocked. The segment runs above the surface.
