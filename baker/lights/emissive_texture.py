@@ -121,7 +121,7 @@ class EmissiveTextures:
         return cls(shading.pack, shading.emission_texture[material], factor, uv)
 
     def _bring_near(self) -> None:
-        """Shift the uv of each triangle by whole periods of the texture, so that they are near 0."""
+        """Shift the uv of each triangle by whole periods of the texture, so that the uv are near 0."""
         for k, levels in enumerate(self.levels):
             own = np.flatnonzero(self.kind == k)
             uv = self.uv[own]

@@ -53,7 +53,7 @@ class SurfacePoints:
 
 
 def instance_map(geometry: Geometry, n_pages: int, resolution: int) -> NDArray[np.int32]:
-    """Return, for each texel, the instance of the triangle that covers most of it.
+    """Return, for each texel, the instance of the triangle that covers the largest area of the texel.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ def _folder_of(package: str) -> Path:
 
 
 def drop_stale(folder: Path, made_of: list[Path]) -> None:
-    """Delete the cache indices of a package that are older than a source file its kernels may depend on.
+    """Delete cache indices of a package that are older than a source file on which its kernels may depend.
 
     Parameters
     ----------

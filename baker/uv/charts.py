@@ -54,7 +54,7 @@ class MeshCharts:
 
 @dataclass(frozen=True)
 class _Welded:
-    """A mesh after its vertices with equal positions were merged.
+    """A mesh whose vertices with equal positions have been merged.
 
     Attributes
     ----------

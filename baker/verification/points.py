@@ -87,7 +87,7 @@ class Pages:
     Attributes
     ----------
     owner : (P, H, W) int32
-        Object that covers most of each texel, -1 for none.
+        Object whose triangle covers the largest area of each texel, -1 for none.
     covered : (P, H, W) bool
         Texels with a measured value.
     """

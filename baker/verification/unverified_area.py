@@ -21,7 +21,7 @@ _TESTED, _POINTS = 400, 4
 
 @dataclass(frozen=True)
 class UnverifiedArea:
-    """Areas in m2.
+    """Areas of the surface that is not compared, and of the whole surface, m2.
 
     Attributes
     ----------

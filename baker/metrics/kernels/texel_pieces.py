@@ -42,7 +42,7 @@ def _box(corner, size):
 
 @kernel
 def texel_owners(uv, triangle, page, instance, size, owner, most):
-    """For each texel, find the instance of the triangle that covers most of it.
+    """For each texel, find the instance of the triangle that covers the largest area of the texel.
 
     N is the number of texels of all pages.
 

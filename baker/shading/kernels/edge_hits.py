@@ -2,8 +2,8 @@
 """Merges hits of a ray on an edge that triangles share, so that they are one crossing of the surface.
 
 With Embree's ROBUST flag, no ray passes between two adjacent triangles. But if a ray meets the common edge of
-two triangles up to rounding errors, Embree reports hits on both triangles. At a vertex, Embree reports hits on
-all triangles around the vertex. Such hits are rare, so the edge hits of each ray are stored and compared with
+two triangles up to rounding errors, Embree reports hits on both triangles. At a vertex, hits on all triangles
+around the vertex are reported. Such hits are rare, so the edge hits of each ray are stored and compared with
 later edge hits. Only hits on triangles of one connected surface (`kernels.alpha.SURFACE`) are merged, because
 two different surfaces at the same position must be crossed separately.
 
