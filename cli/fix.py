@@ -62,7 +62,7 @@ def fix_scene(request: FixRequest, progress: Progress) -> FixResult:
     from baker.repairs.write import write_fixed
 
     result = fix_file(request.scene, request.settings, progress)
-    write_fixed(request.out, result.data)
+    write_fixed(request.out, result.data, request.scene, allow_outside=request.settings.allow_outside)
     return result
 
 

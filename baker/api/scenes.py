@@ -177,11 +177,11 @@ def repair(
     Raises
     ------
     InputError
-        If the file cannot be read.
+        If the file cannot be read, or a defect that is not fixed prevents a bake; `out` is not written.
     SettingsError
         For an unknown setting, a value out of range, or if `out` cannot be written.
     ResourceError
-        If `repair` is set and pymeshlab is not installed.
+        If `repair` is set and pymeshlab is not installed, or the fixed scene cannot be written and read.
     Cancelled
         If `progress` returned a truthy value.
 
@@ -202,7 +202,7 @@ def repair(
         check_fixed(path_of(out, "out"), file, force=force)
     result = fix_file(file, wanted, progress)
     if out is not None:
-        write_fixed(Path(out), result.data)
+        write_fixed(Path(out), result.data, file, allow_outside=wanted.allow_outside)
     return result
 
 

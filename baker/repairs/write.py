@@ -9,6 +9,7 @@ from baker.core.errors import ResourceError, SettingsError
 from baker.io.output_path import resolved_output
 from baker.io.protected_files import check_outputs
 from baker.io.temporary import write_atomically
+from baker.repairs.read_back import check_readable
 
 
 def check_fixed(out: Path, scene: Path, *, force: bool = False) -> None:
@@ -44,8 +45,8 @@ def check_fixed(out: Path, scene: Path, *, force: bool = False) -> None:
         raise ResourceError("nothing can be written there; name another place", file=str(out))
 
 
-def write_fixed(out: Path, data: bytes) -> None:
-    """Write a fixed scene atomically.
+def write_fixed(out: Path, data: bytes, scene: Path, *, allow_outside: bool = False) -> None:
+    """Write a fixed scene atomically, after it was read back.
 
     Parameters
     ----------
@@ -53,10 +54,18 @@ def write_fixed(out: Path, data: bytes) -> None:
         The file to write.
     data : bytes
         The content, a GLB.
+    scene : Path
+        The scene file that was fixed.
+    allow_outside : bool
+        Whether the scene may refer to files outside its folder.
 
     Raises
     ------
+    InputError
+        If the fixed scene cannot be baked because of a defect of `scene` that is not fixed.
     ResourceError
-        If the file cannot be written. An existing file is then unchanged.
+        If the fixed scene cannot be read back for another reason, or the file cannot be written. In every
+        case an existing file is unchanged.
     """
+    check_readable(out, data, scene, allow_outside=allow_outside)
     write_atomically(out, data, "fixed scene")

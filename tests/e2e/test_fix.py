@@ -176,6 +176,10 @@ def test_third_party_scenes_are_fixed_once(path, tmp_path):
     """The fixed file is readable and has the same materials; fixing the fixed file changes nothing."""
     first, second = tmp_path / "first.glb", tmp_path / "second.glb"
     code, text = check(path, "--fix", "-o", first, "--json", "-q", "--resolution", "256")
+    if path.stem == "zero_area_face":
+        assert code == 3, "its only triangle has no area, so no bake could read the result"
+        assert not first.exists()
+        return
     assert code in (0, 1), text
     glb = Glb(first)
     if path.suffix == ".glb":

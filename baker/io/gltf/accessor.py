@@ -18,7 +18,7 @@ _WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 FLOAT = 5126
 UNSIGNED = (5121, 5123, 5125)
 # Largest `count` accepted for an accessor without a buffer view, elements.
-_MAX_ZEROS = 1 << 22
+MAX_ZEROS = 1 << 22
 
 
 def read_accessor(document: GltfDocument, index: int, *, types: tuple[str, ...]) -> NDArray[np.float32]:
@@ -92,7 +92,7 @@ def _rows(document: GltfDocument, accessor: JsonObject, types: tuple[str, ...]) 
     width, count = _WIDTH[kind], accessor.integer("count", minimum=1)
     if "bufferView" in accessor:
         rows = _strided(document, accessor, dtype, count, width)
-    elif count > _MAX_ZEROS:
+    elif count > MAX_ZEROS:
         accessor.fail(f"the accessor has {count} rows but no data", "count")
     else:
         rows = np.zeros((count, width), dtype)

@@ -333,9 +333,11 @@ def test_nothing_is_written_over(tmp_path):
 
 
 def test_a_file_is_written_whole_and_nothing_else(tmp_path):
-    write_fixed(tmp_path / "a" / "fixed.glb", b"123")
+    data = box_builder().glb()
+    scene = write(tmp_path / "scene.glb", data)
+    write_fixed(tmp_path / "a" / "fixed.glb", data, scene)
     assert [p.name for p in (tmp_path / "a").iterdir()] == ["fixed.glb"]
-    assert (tmp_path / "a" / "fixed.glb").read_bytes() == b"123"
+    assert (tmp_path / "a" / "fixed.glb").read_bytes() == data
 
 
 def test_json_is_plain(tmp_path):

@@ -1,0 +1,66 @@
+"""Reads a fixed scene back before it is written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from baker.core.errors import InputError, ResourceError
+from baker.core.light_limits import check_brightness
+from baker.io.gltf.data_ranges import range_faults
+from baker.io.gltf.document import open_document
+from baker.io.load import IMPORTERS, SceneFile, load_scene, read_scene_file
+from baker.io.scene_folder import SceneFolder
+
+
+def check_readable(out: Path, data: bytes, scene: Path, *, allow_outside: bool) -> None:
+    """Check that a bake can read a fixed scene, and that fixing broke none of its data.
+
+    Parameters
+    ----------
+    out : Path
+        The file that will be written.
+    data : bytes
+        Its content, a GLB.
+    scene : Path
+        The scene file that was fixed.
+    allow_outside : bool
+        Whether the scene may refer to files outside its folder.
+
+    Raises
+    ------
+    InputError
+        If a defect of `scene` was not fixed and prevents a bake.
+    ResourceError
+        If the fixed scene cannot be read for another reason.
+    """
+    try:
+        check_brightness(
+            IMPORTERS.require(".glb", "importer")(SceneFile(out, data, allow_outside=allow_outside))
+        )
+        _check_ranges(out, data, scene, allow_outside=allow_outside)
+    except InputError as error:
+        _check_input(scene, allow_outside=allow_outside)
+        what = f"{error.object}: {error.message}" if error.object else error.message
+        message = f"the fixed scene cannot be read back ({what}), so nothing was written; please report this"
+        raise ResourceError(message, file=str(out)) from None
+
+
+def _check_ranges(out: Path, data: bytes, scene: Path, *, allow_outside: bool) -> None:
+    """Raise `InputError` for the first view or accessor that has become unreadable; used or not."""
+    faults = range_faults(open_document(out, data, SceneFolder(out.parent, allow_outside)))
+    if faults and scene.suffix.lower() in (".glb", ".gltf"):
+        # What a bake does not read is not fixed. It keeps its index.
+        folder = SceneFolder(scene.parent, allow_outside)
+        before = range_faults(open_document(scene, read_scene_file(scene), folder))
+        faults = {place: fault for place, fault in faults.items() if place not in before}
+    for fault in faults.values():
+        raise fault
+
+
+def _check_input(scene: Path, *, allow_outside: bool) -> None:
+    """Raise the error with which a bake refuses the scene before the fix, if there is one."""
+    try:
+        load_scene(scene, allow_outside=allow_outside)
+    except InputError as error:
+        message = f"{error.message}; this is not fixed automatically, so nothing was written"
+        raise InputError(message, file=error.file, object=error.object) from None
