@@ -11,12 +11,14 @@ docs/API.md describes every function. Each name of the API is imported when it i
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
 from baker.core.version import VERSION
 
+# The command line imports this module before it can handle Ctrl-C, so do not import `typing`, which takes
+# several milliseconds. Type checkers know this name.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Any
+
     from baker.api.bakes import ao, bake, export, save
     from baker.api.results import batch, diff, render, verify, view
     from baker.api.scenes import check, load, repair, unwrap
@@ -118,6 +120,8 @@ def __getattr__(name: str) -> Any:
     """Import a name of the API when it is first used (PEP 562)."""
     if name not in _HOME:
         raise AttributeError(f"module 'baker' has no attribute '{name}'")
+    from importlib import import_module
+
     value = getattr(import_module(f"baker.{_HOME[name]}"), name)
     globals()[name] = value
     return value

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+# `signal` imports `enum`, which takes longer than all other imports of this module.
+import _signal
 import os
-import signal
 import sys
 
 from baker.cli.interrupt import INTERRUPTED, report_interrupt
@@ -24,7 +25,7 @@ def _end(number: int, frame: object) -> None:
 
 
 # Install the handler during the import, because Ctrl-C may arrive before `main` is called.
-signal.signal(signal.SIGINT, _end)
+_signal.signal(_signal.SIGINT, _end)
 
 
 def open_missing_streams() -> None:

@@ -289,7 +289,7 @@ def export(bake: str | Path | BakeResult, engine: str, out: str | Path) -> Path:
     engine : str
         Name of the engine, such as "godot", "unity" or "three"; see ENGINES.md.
     out : str or Path
-        Folder to write. If it exists, it must be empty.
+        Folder to write. If it exists, it must be empty. After an error it is as before.
 
     Returns
     -------
@@ -311,15 +311,19 @@ def export(bake: str | Path | BakeResult, engine: str, out: str | Path) -> Path:
     from baker.api.folders import folder_of
     from baker.core.errors import SettingsError
     from baker.core.export import EXPORTS, check_exports
+    from baker.io.bake.output_folder import OutputFolder
     from baker.io.bake.read_bake import read_bake
+    from baker.io.bake.recovery import recover
 
     if not isinstance(engine, str):
         raise wrong_type("engine", "the name of one export", engine)
     stored = read_bake(folder_of(bake))
     check_exports((engine,), tuple(stored.maps))
     target = path_of(out, "out")
+    recover(target)
     if target.exists() and (not target.is_dir() or any(target.iterdir())):
         raise SettingsError("there are files here already; name another folder", file=str(target))
-    target.mkdir(parents=True, exist_ok=True)
-    EXPORTS.require(engine, "export").write(stored.folder, target)
+    with OutputFolder(target) as folder:
+        EXPORTS.require(engine, "export").write(stored.folder, folder.path)
+        folder.commit()
     return target

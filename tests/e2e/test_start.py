@@ -48,6 +48,20 @@ def test_ctrl_c_during_imports(module, as_json):
         assert done.stdout == ""
 
 
+def test_few_modules_are_imported_before_ctrl_c_is_handled():
+    """Until then, Ctrl-C ends with Python's own traceback."""
+    # -S leaves out the site packages; without their import hook, the folder `cli` becomes `baker.cli` here.
+    code = (
+        f"import sys, os; sys.path.insert(0, {str(ROOT)!r}); before = set(sys.modules)\n"
+        "import baker, cli; sys.modules['baker.cli'] = cli\n"
+        "import baker.cli.start; print(*sorted(set(sys.modules) - before))"
+    )
+    done = subprocess.run([sys.executable, "-I", "-S", "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    slow = {"typing", "enum", "re", "signal", "functools", "collections", "pathlib", "json"}
+    assert not slow & set(done.stdout.split())
+
+
 @pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
 @pytest.mark.parametrize("words", ["inspect SCENE --json", "inspect missing.glb"])
 def test_closed_streams(closed, words, tmp_path):

@@ -22,7 +22,8 @@ def range_faults(document: GltfDocument) -> dict[tuple[str, int], InputError]:
     dict of (str, int) to InputError
         By the name of the list ("bufferViews" or "accessors") and the index in it.
     """
-    root, found = document.root.value, {}
+    root = document.root.value
+    found: dict[tuple[str, int], InputError] = {}
     for number, _ in objects(root, "bufferViews"):
         try:
             document.view(number)
@@ -31,9 +32,8 @@ def range_faults(document: GltfDocument) -> dict[tuple[str, int], InputError]:
     for number, accessor in objects(root, "accessors"):
         count = accessor.get("count")
         if "bufferView" not in accessor and isinstance(count, int) and count > MAX_ZEROS:
-            fault = InputError(f"it has {count} elements but no data", object=f"accessors[{number}]")
-        else:
-            fault = fault_of(root, document.buffers, number, 1)
-        if fault is not None:
+            message = f"it has {count} elements but no data"
+            found["accessors", number] = InputError(message, object=f"accessors[{number}]")
+        elif (fault := fault_of(root, document.buffers, number, 1)) is not None:
             found["accessors", number] = fault
     return found
