@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 # `signal` imports `enum`, which takes longer than all other imports of this module.
-import _signal
+import _signal  # type: ignore[import-not-found]
 import os
 import sys
 
