@@ -52,7 +52,7 @@ def _check_ranges(out: Path, data: bytes, scene: Path, *, allow_outside: bool) -
         # What a bake does not read is not fixed. It keeps its index.
         folder = SceneFolder(scene.parent, allow_outside)
         before = range_faults(open_document(scene, read_scene_file(scene), folder))
-        faults = {place: fault for place, fault in faults.items() if place not in before}
+        faults = {where: fault for where, fault in faults.items() if where not in before}
     for fault in faults.values():
         raise fault
 
