@@ -18,12 +18,12 @@ METRICS = {"irradiance": {"bias": -0.0123, "median_excess": 0.02, "p95": 0.2}}
 TOO_NOISY = "the reference stayed too noisy; raise `time_limit`"
 
 
-def tested(text: str, **options):
+def limits_of(text: str, **options):
     return evaluate_limits(parse_limits(text, ["irradiance"], ["bias", "p95", "max"]), METRICS, **options)
 
 
 def test_a_good_bake_has_a_sentence_with_its_error_and_its_limits():
-    found = verdict_sentence(tested("irradiance.bias > 0.02, irradiance.p95 > 0.5"), METRICS, default=True)
+    found = verdict_sentence(limits_of("irradiance.bias > 0.02, irradiance.p95 > 0.5"), METRICS, default=True)
     assert found == (
         "The bake is good: irradiance is 1.23% too low on average and off by 2% at a typical texel;"
         " all 2 default limits hold."
@@ -31,13 +31,13 @@ def test_a_good_bake_has_a_sentence_with_its_error_and_its_limits():
 
 
 def test_a_bad_bake_has_a_sentence_with_what_failed():
-    found = verdict_sentence(tested("irradiance.bias > 0.01, irradiance.p95 > 0.5"), METRICS, default=False)
+    found = verdict_sentence(limits_of("irradiance.bias > 0.01, irradiance.p95 > 0.5"), METRICS, default=False)
     assert found == "The bake is not good: 1 of 2 limits of `fail_if` failed (irradiance.bias is -1.23%)."
     assert "limits of --fail-if failed" in in_flags(found)
 
 
 def test_limits_without_a_value_are_counted():
-    verdicts = tested("irradiance.bias > 0.02, irradiance.max > 1", missing_fails=False)
+    verdicts = limits_of("irradiance.bias > 0.02, irradiance.max > 1", missing_fails=False)
     assert "all 2 default limits hold, 1 of them without a value to test" in verdict_sentence(
         verdicts, METRICS, default=True
     )
@@ -74,7 +74,7 @@ def test_a_plot_needs_two_levels():
 
 
 def test_junit_of_verify_names_flags(tmp_path):
-    verdicts = tested("irradiance.bias > 0.01")
+    verdicts = limits_of("irradiance.bias > 0.01")
     check = SimpleNamespace(remarks={"bias": TOO_NOISY})
     bake = SimpleNamespace(folder=SimpleNamespace(name="out"))
     found = SimpleNamespace(bake=bake, verdicts=verdicts, channels={"irradiance": check}, seconds=1.0)
