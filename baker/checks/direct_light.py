@@ -24,6 +24,8 @@ from baker.core.settings import BakeSettings
 # Number of sample points, a multiple of 16.
 # Rays from each point to emitters, and rays from each point for the sky.
 POINTS, EMITTER_RAYS, SKY_RAYS = 512, 16, 16
+# Number of points at which the light of both sides is compared, a multiple of 16.
+SIDE_POINTS = 2048
 _LUMINANCE = np.array(LUMINANCE_WEIGHTS)
 
 
@@ -83,6 +85,57 @@ def estimate_levels(
         )
         total += np.pi * (hit < 0).reshape(-1, SKY_RAYS).mean(axis=1)[:, None] * sky
     return Levels(position, total.max(axis=1), triangle)
+
+
+@dataclass(frozen=True)
+class SideLight:
+    """Direct light of lights with a position and of emitters on both sides of surfaces.
+
+    Attributes
+    ----------
+    front, back : (n,) float64, lx
+        Sum of the components R, G and B.
+    triangle : (n,) int64
+        Index in `WorldTriangles` of the triangle on which each point lies.
+    """
+
+    front: NDArray[np.float64]
+    back: NDArray[np.float64]
+    triangle: NDArray[np.int64]
+
+
+def side_light(scene: Scene, world: WorldTriangles, emission: Emission, seed: int) -> SideLight:
+    """Estimate the light of lights with a position and of emitters on both sides at random points.
+
+    Parameters
+    ----------
+    scene : Scene
+        The lights.
+    world : WorldTriangles
+        The triangles of the scene.
+    emission : Emission
+        The triangles that emit.
+    seed : int
+        Seed of the points and of the rays to emitters.
+
+    Returns
+    -------
+    SideLight
+        `SIDE_POINTS` points, stratified by area, with the light on their two sides.
+    """
+    random = np.random.default_rng(seed)
+    position, normal, triangle = spread_points(world, SIDE_POINTS, random)
+    lights = [
+        light for light in scene.local_lights if kind_of(light).has_position and max(light.intensity) > 0
+    ]
+    sides = []
+    for up in (normal, -normal):
+        origin = world.lifted(position, triangle, up)
+        total = _emissive(world, emission, origin, up, random)
+        for light in lights:
+            total += _punctual(world, light, origin, up)
+        sides.append(total.sum(axis=1))
+    return SideLight(sides[0], sides[1], triangle)
 
 
 def spread_points(

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, TextIO
 
-from baker.checks.finding import SEVERITIES, finding_json
+from baker.checks.finding import SEVERITIES, Finding, finding_json
 from baker.checks.run import CheckReport
 from baker.checks.scenes import Unreadable
+
+# Number of findings of one code that are written without `verbose`.
+SHOWN = 3
 
 
 def report_json(reports: Sequence[CheckReport], unreadable: Sequence[Unreadable] = ()) -> dict[str, Any]:
@@ -53,7 +56,7 @@ def report_json(reports: Sequence[CheckReport], unreadable: Sequence[Unreadable]
 
 
 def write_text(report: CheckReport, stream: TextIO, *, verbose: int = 0, cost: bool = False) -> None:
-    """Write each finding on one line with its advice on the next, then a summary line.
+    """Write the findings of each code as a group with its advice, then a summary line.
 
     Parameters
     ----------
@@ -62,33 +65,54 @@ def write_text(report: CheckReport, stream: TextIO, *, verbose: int = 0, cost: b
     stream : TextIO
         Text stream to write to.
     verbose : int
-        If above 0, findings of severity info, face numbers and the share of each object are written as well.
+        If above 0, findings of severity info, all findings of a group, face numbers and the share of each
+        object are written as well.
     cost : bool
         Whether the finding `cost` is written, with the share of each object.
     """
-    shown = [
-        finding
-        for finding in report.findings
-        if verbose or finding.severity != "info" or (cost and finding.code == "cost")
-    ]
-    for finding in shown:
-        where = f" '{finding.object}'" if finding.object else ""
-        if finding.node is not None:
-            where += f" (node {finding.node})"
-        stream.write(f"{report.path}: {finding.severity}: {finding.code}:{where} {finding.message}\n")
-        faces = finding.found.faces
-        if faces and verbose:
-            primitive = finding.found.primitive
-            stream.write(f"    faces {' '.join(map(str, faces))} of primitive {primitive}\n")
-        stream.write(f"    {finding.fix}\n")
-        if finding.code == "cost" and (cost or verbose):
-            for entry in finding.found.more["objects"]:
+    groups: dict[tuple[str, str], list[Finding]] = {}
+    for finding in report.findings:
+        if verbose or finding.severity != "info" or (cost and finding.code == "cost"):
+            groups.setdefault((finding.severity, finding.code), []).append(finding)
+    for group in groups.values():
+        _write_group(str(report.path), group, stream, verbose=verbose)
+        if group[0].code == "cost":
+            for entry in group[0].found.more["objects"]:
                 stream.write(f"    {entry['percent']:6.2f}%  {entry['texels']:9} texels  {entry['object']}\n")
     counts = _counts(report)
     parts = [f"{counts[name]} {name}{'s' if counts[name] != 1 else ''}" for name in reversed(SEVERITIES)]
     tail = f", {len(report.ignored)} ignored" if report.ignored else ""
+    hidden = counts["info"] - sum(len(group) for (severity, _), group in groups.items() if severity == "info")
+    tail += "; -v shows the infos" if hidden else ""
     verdict = "passed" if report.passed else "FAILED"
     stream.write(f"{report.path}: {verdict}: {', '.join(parts)}{tail} ({report.seconds:.1f} s)\n")
+
+
+def _write_group(path: str, group: list[Finding], stream: TextIO, *, verbose: int) -> None:
+    """Write the findings of one code and severity, and their advice once."""
+    head = f"{path}: {group[0].severity}: {group[0].code}:"
+    if len(group) == 1:
+        stream.write(f"{head}{_subject(group[0])} {group[0].message}\n")
+        _write_faces(group[0], stream, verbose=verbose)
+    else:
+        stream.write(f"{head} {len(group)} findings\n")
+        for finding in group if verbose else group[:SHOWN]:
+            stream.write(f"   {_subject(finding)} {finding.message}\n")
+            _write_faces(finding, stream, verbose=verbose)
+        if not verbose and len(group) > SHOWN:
+            stream.write(f"    and {len(group) - SHOWN} more; -v shows all\n")
+    stream.write(f"    to do: {group[0].fix}\n")
+
+
+def _subject(finding: Finding) -> str:
+    where = f" '{finding.object}'" if finding.object else ""
+    return where if finding.node is None else f"{where} (node {finding.node})"
+
+
+def _write_faces(finding: Finding, stream: TextIO, *, verbose: int) -> None:
+    if finding.found.faces and verbose:
+        faces = " ".join(map(str, finding.found.faces))
+        stream.write(f"    faces {faces} of primitive {finding.found.primitive}\n")
 
 
 def _counts(report: CheckReport) -> dict[str, int]:

@@ -59,3 +59,22 @@ def percent(share: float, *, signed: bool = False) -> str:
     """
     value = 100.0 * share
     return f"{number(0.0 if abs(value) < 1e-4 else value, signed=signed)}%"
+
+
+def amount(value: float) -> str:
+    """Return a number with three significant digits, with "million" or "billion" for large ones.
+
+    Parameters
+    ----------
+    value : float
+        The number.
+
+    Returns
+    -------
+    str
+        "12300" or "2.5 million".
+    """
+    for size, word in ((1e12, "trillion"), (1e9, "billion"), (1e6, "million")):
+        if math.isfinite(value) and size <= abs(value) < 1e15:
+            return f"{number(value / size)} {word}"
+    return number(value)

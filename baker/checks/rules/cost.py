@@ -15,6 +15,7 @@ from baker.checks.context import CheckContext
 from baker.checks.finding import RawFinding
 from baker.checks.rule import check
 from baker.core.budget import FILLED, Workload, image_bytes, texels_and_pages
+from baker.core.readable import amount, number
 from baker.core.stage import Stage
 
 # Constants of the time estimate if there is no earlier bake, measured on the scenes cornell.glb, hall.glb and
@@ -158,9 +159,8 @@ def cost_of_bake(context: CheckContext) -> Iterator[RawFinding]:
         rates = probe(context)
     rays = sum(cost.rays.values())
     pages = "1 page" if cost.pages == 1 else f"{cost.pages} pages"
-    text = (
-        f"about {cost.texels:.3g} texels on {pages}, {rays:.3g} rays, {cost.bytes / 2**30:.2g} GiB of memory"
-    )
+    memory = number(cost.bytes / 2**30)
+    text = f"about {amount(cost.texels)} texels on {pages}, {amount(rays)} rays, {memory} GiB of memory"
     more: dict[str, Any] = {
         "texels": cost.texels,
         "pages": cost.pages,

@@ -11,6 +11,7 @@ from baker.checks.direct_light import cosine_directions, points_inside
 from baker.checks.finding import Location, RawFinding
 from baker.checks.rule import check
 from baker.core.encoding import ALWAYS_WRITTEN, ENCODINGS
+from baker.core.readable import amount, number
 
 # Number of rays from each emissive object that test whether it faces any surface.
 FACING_RAYS = 64
@@ -52,7 +53,7 @@ def clips_half(context: CheckContext) -> Iterator[RawFinding]:
         share = 100.0 * len(over) / len(levels.irradiance)
         x, y, z = (float(v) for v in levels.position[worst] + context.scene.origin)
         most = levels.irradiance[worst]
-        text = f"about {share:.3g}% of the surface gets more than {highest:.5g} lx, up to {most:.3g}"
+        text = f"about {number(share)}% of the surface gets more than {highest:g} lx, up to {amount(most)}"
         at = context.source.instances[context.world.instance[levels.triangle[worst]]]
         yield RawFinding(text, Location(at.name, at.node), len(over), percent=share, position=(x, y, z))
 
@@ -69,7 +70,8 @@ def light_levels(context: CheckContext) -> Iterator[RawFinding]:
     if levels is not None and levels.irradiance.any():
         low, middle, high = np.percentile(levels.irradiance, [0, 50, 100])
         dark = 100.0 * float((levels.irradiance == 0).mean())
-        text = f"direct light is {low:.3g} to {high:.3g} lx, median {middle:.3g}; {dark:.2g}% gets none"
+        text = f"direct light is {amount(low)} to {amount(high)} lx, median {amount(middle)};"
+        text += f" {number(dark)}% of the surface gets none"
         more = {"darkest": float(low), "median": float(middle), "brightest": float(high)}
         yield RawFinding(text, count=len(levels.position), percent=dark, more=more)
 

@@ -13,6 +13,7 @@ from baker.checks.finding import Location, RawFinding
 from baker.checks.rule import check
 from baker.core.colour import linear_from_srgb
 from baker.core.light_kind import kind_of, light_positions
+from baker.core.readable import amount
 from baker.topology.winding_number import first_inside
 
 # Albedo above which a material is reported.
@@ -86,8 +87,8 @@ def light_range(context: CheckContext) -> Iterator[RawFinding]:
         k = min(ends, key=lambda k: lights[k].range)
         light = lights[k]
         text = (
-            f"the {light.kind} light ends at its range of {light.range:.3g} m; the scene reaches "
-            f"{farthest[k]:.3g} m from it, and what lies beyond the range gets none of its light"
+            f"the {light.kind} light ends at its range of {amount(light.range)} m; the scene reaches "
+            f"{amount(farthest[k])} m from it, and what lies beyond the range gets none of its light"
         )
         text += f" (so do {len(ends) - 1} further lights with ranges of their own)" if len(ends) > 1 else ""
         yield RawFinding(text, Location(light.name, light.node), count=len(ends), position=light.position)
@@ -167,14 +168,14 @@ def light_intensity(context: CheckContext) -> Iterator[RawFinding]:
             yield RawFinding(f"the {light.kind} light has no intensity", location, position=at)
         elif max(light.intensity) > kind.plausible_max:
             most = max(light.intensity)
-            text = f"the {light.kind} light has {most:.3g} {unit}; if watts were multiplied by 683 lm/W "
-            text += f"(Blender's lighting mode Standard), export it as Unitless: {most / 683:.3g} {unit}"
+            text = f"the {light.kind} light has {amount(most)} {unit}; if watts were multiplied by 683 lm/W "
+            text += f"(Blender's lighting mode Standard), export it as Unitless: {amount(most / 683)} {unit}"
             yield RawFinding(text, location, position=at)
     for k in context.used_materials:
         material = context.scene.materials[k]
         if max(material.emission) > ABSURD_EMISSION:
             yield RawFinding(
-                f"the material emits {max(material.emission):.3g} cd/m2", Location(material.name)
+                f"the material emits {amount(max(material.emission))} cd/m2", Location(material.name)
             )
 
 
@@ -199,13 +200,13 @@ def albedo(context: CheckContext) -> Iterator[RawFinding]:
         if value > MOST_REFLECTED:
             mesh = context.mesh_with[k]
             what = f"material '{material.name}'" if material.name else "the default material"
-            text = f"{what} has an albedo of {value:.3g}"
+            text = f"{what} has an albedo of {amount(value)}"
             if value > NEARLY_WHITE:
                 from baker.checks.trapped_light import MOST_GAIN, trapped_gain
 
                 gain = trapped_gain(context, reflected) if gain is None else gain
                 if gain > MOST_GAIN:
-                    text += f": all bounces together multiply light by about {gain:.3g}"
+                    text += f": all bounces together multiply light by about {amount(gain)}"
             yield RawFinding(text, context.location(mesh), more={"material": k})
 
 

@@ -17,6 +17,10 @@ from baker.topology.weld import connected, number_by_first
 
 # A piece counts as closed except for holes if the holes' area is less than this share of the piece's area.
 MOST_OPEN = 0.05
+# Largest number of holes of a mesh that are tested for being a missing bottom. A bottom is missing if the
+# normals of the faces beside it have a vertical component of at most `STEEP`, and if its edges lie above the
+# lowest vertex of the piece by at most the share `FLAT` of the height of the piece.
+MOST_BOTTOMS, STEEP, FLAT = 64, 0.5, 1e-3
 
 
 def _files(facts: MeshFacts, rows: NDArray[np.integer]) -> NDArray[np.int64]:
@@ -110,7 +114,8 @@ def open_edges(context: CheckContext) -> Iterator[RawFinding]:
 
     Light leaks through the holes. A part of the mesh is reported if the area of its holes is less than 5 % of
     the area of its faces. Larger holes are assumed to be intended, as in a box without a lid or a sheet of
-    terrain.
+    terrain. A missing bottom is intended, too, as at the feet of an arch that stands on the ground: its edges
+    are in the lowest horizontal plane of the part, and the faces beside it are steep.
     """
     for m, facts in enumerate(context.meshes):
         edges = facts.edges
@@ -126,7 +131,10 @@ def open_edges(context: CheckContext) -> Iterator[RawFinding]:
         missing = np.bincount(of, area, facts.n_pieces)
         whole = np.bincount(facts.piece, facts.area[facts.sheet], facts.n_pieces)
         leaky = missing < MOST_OPEN * np.maximum(whole, 1e-300)
-        chosen = leaky[piece]
+        shown = context.first_instance.get(m)
+        up = np.array([0.0, 1.0, 0.0]) if shown is None else shown.world_from_object[1, :3]
+        meant = _missing_bottoms(facts, border, hole, area, up)
+        chosen = leaky[piece] & ~meant[hole]
         if chosen.any():
             n, holes = int(chosen.sum()), len(np.unique(hole[chosen]))
             some = "1 hole" if holes == 1 else f"{holes} holes"
@@ -170,6 +178,38 @@ def _hole_area(
     twice = np.cross(a - centre[hole], b - centre[hole])
     total = np.stack([np.bincount(hole, twice[:, k], n_holes) for k in range(3)], axis=1)
     return np.asarray(0.5 * np.linalg.norm(total, axis=1), np.float64)
+
+
+def _missing_bottoms(
+    facts: MeshFacts,
+    border: NDArray[np.int64],
+    hole: NDArray[np.int64],
+    area: NDArray[np.float64],
+    up: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """Return (H,) bool: the holes that are a missing bottom, out of the `MOST_BOTTOMS` largest holes.
+
+    `border` (n,) are the open edges, `hole` (n,) are their holes, `area` (H,) are the holes' areas, and `up`
+    (3,) is the gradient of the height in object space.
+    """
+    edges = facts.edges
+    face, corner = edges.face[edges.first[border]], edges.corner[edges.first[border]]
+    around = facts.corner[facts.sheet[face]]
+    row = np.arange(len(face))
+    start = around[row, corner]
+    up = up / max(float(np.linalg.norm(up)), 1e-300)
+    vector = facts.area_vector[facts.sheet[face]]
+    normal = vector / np.maximum(np.linalg.norm(vector, axis=1), 1e-300)[:, None]
+    meant = np.zeros(len(area), bool)
+    for k in np.argsort(-area, kind="stable")[:MOST_BOTTOMS]:
+        mine = np.flatnonzero(hole == k)
+        if np.abs(normal[mine] @ up).max() > STEEP:
+            continue
+        piece = facts.piece[face[mine[0]]]
+        height = facts.corner[facts.sheet[facts.piece == piece]].reshape(-1, 3) @ up
+        edge = start[mine] @ up
+        meant[k] = edge.max() - height.min() <= FLAT * float(np.ptp(height))
+    return meant
 
 
 @check(

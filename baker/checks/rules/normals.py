@@ -12,6 +12,7 @@ from baker.checks.finding import RawFinding
 from baker.checks.mesh_facts import MeshFacts
 from baker.checks.rule import check
 from baker.checks.rules.bad_faces import faces_found
+from baker.core.readable import number
 from baker.core.source_mesh import SourcePrimitive
 from baker.topology.unique_rows import unique_rows
 
@@ -98,7 +99,9 @@ def normal_length(context: CheckContext) -> Iterator[RawFinding]:
             faces = _faces_at(facts, k, odd)
             if len(faces):
                 worst = length[odd][np.argmax(np.abs(length[odd] - 1.0))]
-                yield faces_found(context, m, faces, f"{{some}} with a normal of length {worst:.3g}, not 1")
+                yield faces_found(
+                    context, m, faces, f"{{some}} with a normal of length {number(worst)}, not 1"
+                )
 
 
 @check(

@@ -11,6 +11,7 @@ from baker.checks.finding import Location, RawFinding
 from baker.checks.rule import check
 from baker.checks.rules.cost import estimate_cost
 from baker.core.precision import coarse_objects
+from baker.core.readable import number
 
 # Smallest / largest singular value of the transform. Below this ratio a bake leaves an instance out.
 FLATTEST = 1e-7
@@ -75,7 +76,7 @@ def non_uniform_scale(context: CheckContext) -> Iterator[RawFinding]:
         if stretch[2] > FLATTEST * stretch[0] and stretch[0] > 1.01 * stretch[2]:
             ratio = float(stretch[0] / stretch[2])
             yield RawFinding(
-                f"the node stretches its mesh {ratio:.3g} times more along one axis than along another",
+                f"the node stretches its mesh {number(ratio)} times more along one axis than along another",
                 location,
                 position=at,
             )
@@ -123,5 +124,5 @@ def scene_size(context: CheckContext) -> Iterator[RawFinding]:
     if diagonal > 0 and not SMALLEST <= diagonal <= LARGEST:
         how = "small" if diagonal < SMALLEST else "large"
         yield RawFinding(
-            f"the scene is {diagonal:.3g} m from corner to corner: very {how}, likely a wrong unit"
+            f"the scene is {number(diagonal)} m from corner to corner: very {how}, likely a wrong unit"
         )

@@ -13,6 +13,7 @@ from baker.checks.finding import MOST_FACES, RawFinding
 from baker.checks.rule import check
 from baker.checks.rules.bad_faces import faces_found
 from baker.checks.uv_facts import UvFacts
+from baker.core.readable import number
 from baker.uv.check import EDGE_SLACK, MOST_LOST, PAGE_TOLERANCE
 
 _UNWRAP = "unwrap the object (`fix` does, a bake with `uv='auto'` does so, too)"
@@ -97,7 +98,7 @@ def overlap(context: CheckContext) -> Iterator[RawFinding]:
         if doubled > max(2, PAGE_TOLERANCE * (covered + doubled)):
             percent = 100.0 * doubled / (covered + doubled)
             noted = uv.faces[pairs[: counts[LISTED]]]
-            text = f"{percent:.3g}% of its texels at {resolution} belong to more than one face"
+            text = f"{number(percent)}% of its texels at {resolution} belong to more than one face"
             found = faces_found(context, m, noted[:, 1], text)
             both = tuple((int(a), int(b)) for a, b in uv.facts.local[noted])
             yield replace(found, count=int(counts[OVERLAPPING]), percent=percent, pairs=both)
@@ -118,7 +119,7 @@ def degenerate(context: CheckContext) -> Iterator[RawFinding]:
             text = f"the whole TEXCOORD_1 covers less than one texel of a page of {resolution}"
             yield replace(faces_found(context, m, uv.faces, text), severity="error")
         elif flat.any():
-            text = f"{{some}} without area in TEXCOORD_1, {100 * lost:.3g}% of the surface"
+            text = f"{{some}} without area in TEXCOORD_1, {number(100 * lost)}% of the surface"
             found = faces_found(context, m, worst_first(uv.faces[flat], uv.area[flat]), text)
             yield replace(found, percent=100.0 * lost, severity="error" if lost > MOST_LOST else None)
 

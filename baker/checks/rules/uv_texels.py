@@ -14,6 +14,7 @@ from baker.checks.rule import check
 from baker.checks.rules.bad_faces import faces_found
 from baker.checks.rules.uv_layout import laid_out
 from baker.checks.uv_facts import UvFacts
+from baker.core.readable import number
 
 # Area of a chart below which it is reported, texels.
 SMALLEST_CHART = 4.0
@@ -69,7 +70,7 @@ def padding(context: CheckContext) -> Iterator[RawFinding]:
         if close:
             percent = 100.0 * close / covered
             yield RawFinding(
-                f"{percent:.3g}% of its texels touch another chart's: bilinear lookup mixes them",
+                f"{number(percent)}% of its texels touch another chart's: bilinear lookup mixes them",
                 context.location(m),
                 close,
                 percent=percent,
@@ -96,7 +97,7 @@ def padding_mip(context: CheckContext) -> Iterator[RawFinding]:
         if close:
             percent = 100.0 * close / covered
             yield RawFinding(
-                f"{percent:.3g}% of its texels at mip level {context.mip} touch another chart's",
+                f"{number(percent)}% of its texels at mip level {context.mip} touch another chart's",
                 context.location(m),
                 close,
                 percent=percent,
@@ -141,7 +142,7 @@ def density(context: CheckContext) -> Iterator[RawFinding]:
             faces = uv.faces[np.isin(uv.chart, odd)]
             some = "1 chart has" if len(odd) == 1 else f"{len(odd)} of {uv.n_charts} charts have"
             found = faces_found(
-                context, m, faces, f"{some} up to {worst:.3g} times the usual texels per metre"
+                context, m, faces, f"{some} up to {number(worst)} times the usual texels per metre"
             )
             yield replace(found, count=len(odd), percent=100.0 * float(real[odd].sum() / real.sum()))
 
@@ -170,7 +171,9 @@ def stretch(context: CheckContext) -> Iterator[RawFinding]:
         share = float(uv.area[bad].sum()) / max(float(uv.area.sum()), 1e-300)
         if share > MOST_STRETCHED:
             order = np.argsort(-uv.area[bad], kind="stable")
-            text = f"{{some}}, {100 * share:.3g}% of the surface, stretched over {STRETCH:g} times one way"
+            text = (
+                f"{{some}}, {number(100 * share)}% of the surface, stretched over {STRETCH:g} times one way"
+            )
             yield replace(faces_found(context, m, uv.faces[bad][order], text), percent=100.0 * share)
 
 
@@ -214,7 +217,9 @@ def utilisation(context: CheckContext) -> Iterator[RawFinding]:
         if rectangle > 0 and filled < LEAST_FILLED * rectangle:
             percent = 100.0 * filled / rectangle
             yield RawFinding(
-                f"its TEXCOORD_1 fills {percent:.3g}% of its rectangle", context.location(m), percent=percent
+                f"its TEXCOORD_1 fills {number(percent)}% of its rectangle",
+                context.location(m),
+                percent=percent,
             )
 
 
@@ -243,5 +248,5 @@ def palette(context: CheckContext) -> Iterator[RawFinding]:
         step = np.clip(np.round(uv.uv[point].reshape(-1, 2) * 256.0), -(2.0**20), 2.0**20).astype(np.int64)
         colours = len(np.unique(step[:, 0] * 2**22 + step[:, 1]))
         if len(uv.rows) >= 2 * colours:
-            text = f"its TEXCOORD_0 looks up {colours} colours for {100 * share:.3g}% of the surface"
+            text = f"its TEXCOORD_0 looks up {colours} colours for {number(100 * share)}% of the surface"
             yield RawFinding(text, context.location(m), int(point.sum()), percent=100.0 * share)

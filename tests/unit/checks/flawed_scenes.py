@@ -129,6 +129,28 @@ def painted(grey: float) -> bytes:
     return scene(quad(COLOR_0=colour))
 
 
+def dimmed(level: float) -> bytes:
+    """Return a GLB of a square of a grey material whose vertex colours have the given level."""
+    return scene(quad(COLOR_0=np.full((4, 3), level, np.float32)))
+
+
+def rounded_uv(levels: int) -> bytes:
+    """Return a GLB of a grid whose TEXCOORD_1 is rounded to multiples of 1 / `levels`."""
+    wavy = 0.05 + 0.9 * (GRID[:, :2] + 0.02 * np.sin(7 * GRID[:, 1::-1]))
+    return with_uv(np.round(wavy * levels) / levels, GRID, GRID_TRIANGLE)
+
+
+def facing(triangle: Any) -> bytes:
+    """Return a GLB of a floor with the given triangles, and a light above it."""
+    return scene((FLOOR, triangle), lights=(point(1),))
+
+
+def two_meshes(first: Any, second: Any) -> bytes:
+    """Return a GLB of two meshes, squares whose TEXCOORD_1 fill the boxes (u0, v0, u1, v1)."""
+    uv = boxes(first, second)
+    return scene(*(quad(TEXCOORD_1=np.float32(part)) for part in (uv[:4], uv[4:])))
+
+
 def emissive(colour: int) -> bytes:
     """Return a GLB of a floor whose emissive texture has the 8-bit level `colour` everywhere."""
 
@@ -317,6 +339,13 @@ CASES: dict[str, Case] = {
     ),
     "clips-half": Case(
         scene(floor(), lights=(point(9e5),)), scene(floor(), lights=(point(2e5),)), {"seed": 1}
+    ),
+    "dark-colours": Case(dimmed(0.2), dimmed(0.4)),
+    "daylight-levels": Case(scene(floor(), lights=(point(3e5),)), scene(floor(), lights=(point(3e4),))),
+    "lit-from-behind": Case(facing(QUAD_TRIANGLE[:, ::-1]), facing(QUAD_TRIANGLE)),
+    "uv.precision": Case(rounded_uv(255), rounded_uv(4095), {"resolution": 1024}),
+    "uv.shared": Case(
+        two_meshes((0, 0, 0.5, 0.5), (0.4, 0, 0.9, 0.5)), two_meshes((0, 0, 0.4, 0.5), (0.5, 0, 0.9, 0.5))
     ),
     "light-levels": Case(scene(floor(), lights=(point(1),)), scene(floor())),
     "emitter-unseen": Case(

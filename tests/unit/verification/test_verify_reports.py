@@ -31,7 +31,9 @@ def test_a_good_bake_has_a_sentence_with_its_error_and_its_limits():
 
 
 def test_a_bad_bake_has_a_sentence_with_what_failed():
-    found = verdict_sentence(limits_of("irradiance.bias > 0.01, irradiance.p95 > 0.5"), METRICS, default=False)
+    found = verdict_sentence(
+        limits_of("irradiance.bias > 0.01, irradiance.p95 > 0.5"), METRICS, default=False
+    )
     assert found == "The bake is not good: 1 of 2 limits of `fail_if` failed (irradiance.bias is -1.23%)."
     assert "limits of --fail-if failed" in in_flags(found)
 
