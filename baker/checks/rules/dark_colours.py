@@ -35,9 +35,9 @@ def dark_colours(context: CheckContext) -> Iterator[RawFinding]:
         for k, primitive in enumerate(facts.source.primitives):
             material = context.scene.materials[primitive.material]
             base = material.base_colour[:3]
-            plain = material.base_colour_texture is None and min(base) >= WHITE
+            white = material.base_colour_texture is None and min(base) >= WHITE
             rows = np.flatnonzero(facts.primitive[facts.good] == k) if primitive.colour is not None else ()
-            if primitive.colour is None or not len(rows) or plain or max(base) < COLOURED:
+            if primitive.colour is None or not len(rows) or white or max(base) < COLOURED:
                 continue
             corner = facts.triangle[facts.good[rows]] - facts.vertex_start[k]
             colour = np.clip(np.nan_to_num(primitive.colour[corner, :3], nan=1.0), 0.0, 1.0)

@@ -13,7 +13,8 @@ from baker.checks.rule import check
 from baker.core.light_kind import kind_of
 from baker.core.readable import number
 
-# Median direct irradiance from which lamps are implausible, lx: offices have 500, an overcast day 10 000.
+# Implausible median of the direct irradiance of lights with a position, lx. Offices have 500, an overcast day
+# 10 000.
 DAYLIGHT = 10_000.0
 # Luminous efficacy with which exporters convert watts to lumens, lm/W.
 EFFICACY = 683.0

@@ -20,7 +20,7 @@ _SIDE = 512
     "uv.shared",
     group="uv",
     severity="info",
-    fix="nothing to do for a bake, which packs these objects anew; lay them out together to keep their uv",
+    fix="nothing to do for a bake, which packs these objects again; lay them out together to keep their uv",
 )
 def shared(context: CheckContext) -> Iterator[RawFinding]:
     """Objects whose TEXCOORD_1 overlaps that of another object.
