@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 # Arguments that name a file or a folder to write. Every other path is an input.
-OUTPUTS = frozenset({"junit", "out", "report", "sarif"})
+OUTPUTS = frozenset({"export", "junit", "out", "report", "sarif"})
 # Commands whose argument `out` is the folder of an existing bake, which they only read.
 _READ = frozenset({"verify", "view"})
 

@@ -1,4 +1,4 @@
-"""`baker view OUT`: shows a bake in a local web page."""
+"""`baker view OUT`: shows a bake in a local web page, or writes the page as static files."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ import sys
 import threading
 import webbrowser
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from baker.cli.command import Run, command
 from baker.core.settings_model import RunSettings
+
+if TYPE_CHECKING:
+    from baker.viewer.script import ThreeScript
 
 
 # No ray is traced here, but the flags of ray tracing are accepted, so that scripts can pass them to every
@@ -30,14 +33,24 @@ def view(
         Path | None,
         typer.Option("--three", metavar="PATH", help="Your own three.js: its file, or npm's folder."),
     ] = None,
+    export: Annotated[
+        Path | None,
+        typer.Option("--export", metavar="DIR", help="Write the page as static files and end."),
+    ] = None,
 ) -> None:
-    """Serve the web page until Ctrl-C, which ends the command with exit code 0."""
+    """Serve the web page until Ctrl-C, which ends the command with exit code 0.
+
+    With --export, write the page and its data into a folder that any web server can show.
+    """
     from baker.io.bake.read_bake import read_bake
     from baker.viewer.script import find_three
     from baker.viewer.server import make_server
 
     run: Run = ctx.obj
     script = find_three(three)
+    if export is not None:
+        _export(run, out, script, export)
+        return
     bake = read_bake(out)
     server = make_server(bake, script, port=port)
     if run.as_json:
@@ -59,3 +72,23 @@ def view(
             text.write("ended\n")
     finally:
         server.server_close()
+
+
+def _export(run: Run, out: Path, script: ThreeScript, folder: Path) -> None:
+    """Write the page into `folder` instead of serving it."""
+    from baker.io.bake.read_bake import read_bake
+    from baker.viewer.export import checked_folder, export_page
+
+    checked_folder(folder)
+    bake = read_bake(out)
+    names = export_page(bake, script, folder)
+    size = sum((folder / name).stat().st_size for name in names)
+    if run.as_json:
+        run.session.write_json({"out": str(out), "export": str(folder), "files": len(names), "bytes": size})
+    if not run.quiet:
+        for warning in bake.warnings:
+            run.text.write(f"warning: {warning.message}\n")
+        run.text.write(
+            f"{folder}/index.html shows {out} ({len(names)} files, {size / 1e6:.1f} MB); serve the folder"
+            " with a web server, because browsers do not run the page from a file\n"
+        )

@@ -183,7 +183,7 @@ def atomic_path(path: Path, what: str) -> Iterator[Path]:
             # Write directly to a device or a pipe instead of replacing it by a file.
             yield target
             return
-        _remove_abandoned(target)
+        remove_abandoned(target)
         folder = TemporaryFolder(target)
         target.parent.mkdir(parents=True, exist_ok=True)
         try:
@@ -199,8 +199,14 @@ def atomic_path(path: Path, what: str) -> Iterator[Path]:
         raise ResourceError(error.message, file=str(path)) from error
 
 
-def _remove_abandoned(target: Path) -> None:
-    """Remove the temporary folders that killed processes have left for a file."""
+def remove_abandoned(target: Path) -> None:
+    """Remove the temporary folders that killed processes have left for an output.
+
+    Parameters
+    ----------
+    target : Path
+        The output file or folder; an absolute path.
+    """
     for found in temporaries(target):
         with claim(found) as free:
             if free:

@@ -10,44 +10,20 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import json
-from collections.abc import Callable
-from functools import partial
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
-import numpy as np
-from numpy.typing import NDArray
-
 from baker.core.errors import ResourceError
-from baker.io.bake.output_folder import own_files
 from baker.io.bake.read_bake import StoredBake
-from baker.viewer.page_data import page_numbers
-from baker.viewer.scene_data import scene_data
+from baker.viewer.answers import POLICY, Answer, page_answers
 from baker.viewer.script import ThreeScript
 from baker.viewer.strict_http import fault_of_request
 
 HOST = "127.0.0.1"
-STATIC = Path(__file__).resolve().parent / "static"
-_MIME = {
-    ".html": "text/html; charset=utf-8",
-    ".css": "text/css; charset=utf-8",
-    ".js": "text/javascript; charset=utf-8",
-    ".mjs": "text/javascript; charset=utf-8",
-    ".json": "application/json",
-    ".png": "image/png",
-    ".svg": "image/svg+xml",
-    ".glb": "model/gltf-binary",
-}
-_BYTES = "application/octet-stream"
-# Content-Security-Policy: forbid scripts, styles and requests from other origins.
-_POLICY = "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'; base-uri 'none'"
-
-# Response to a request: media type, and a function that returns the bytes.
-Answer = tuple[str, Callable[[], bytes]]
+# A meta tag, as in an exported page, cannot forbid frames.
+_POLICY = f"{POLICY}; frame-ancestors 'none'"
 
 
 class ViewServer(ThreadingHTTPServer):
@@ -98,7 +74,7 @@ def make_server(bake: StoredBake, three: ThreeScript, *, port: int = 0) -> ViewS
     ResourceError
         If the port is in use or not permitted.
     """
-    answers = _answers(bake, three)
+    answers = {f"/{address}": answer for address, answer in page_answers(bake, three).items()}
     try:
         return ViewServer(port, answers)
     except OSError as error:
@@ -106,47 +82,6 @@ def make_server(bake: StoredBake, three: ThreeScript, *, port: int = 0) -> ViewS
             raise
         message = f"port {port} is taken or not ours to use; name another with `port`, or leave it out"
         raise ResourceError(message) from None
-
-
-def _answers(bake: StoredBake, three: ThreeScript) -> dict[str, Answer]:
-    data = scene_data(bake)
-    header = {**data.header, "three": {"file": f"three/{three.path.name}", "module": three.module}}
-    text = json.dumps(header, allow_nan=False).encode()
-    answers: dict[str, Answer] = {
-        "/": _file(STATIC / "index.html"),
-        "/scene.json": (_MIME[".json"], lambda: text),
-        "/geometry": (_BYTES, lambda: data.geometry),
-    }
-    for path in STATIC.iterdir():
-        answers[f"/static/{path.name}"] = _file(path)
-    for name, path in three.files.items():
-        answers[f"/three/{name}"] = _file(path)
-    for number, image in enumerate(data.images):
-        answers[f"/image/{number}"] = (_BYTES, partial(_bytes, image))
-    for page in range(bake.atlas.n_pages):
-        answers[f"/status/{page}"] = (_BYTES, partial(_bytes, bake.status[page]))
-        for name, value in bake.maps.items():
-            if page < len(value):
-                answers[f"/page/{name}/{page}"] = (_BYTES, partial(_page_bytes, value[page]))
-    folder = bake.folder.resolve()
-    for name in own_files(folder) or ():
-        # Leave out files outside the folder, which a manifest may name through links.
-        path = (folder / name).resolve()
-        if path.is_relative_to(folder) and path.is_file():
-            answers[f"/out/{name}"] = _file(path)
-    return answers
-
-
-def _bytes(array: NDArray[Any]) -> bytes:
-    return np.ascontiguousarray(array).tobytes()
-
-
-def _page_bytes(page: NDArray[np.float32]) -> bytes:
-    return page_numbers(page).tobytes()
-
-
-def _file(path: Path) -> Answer:
-    return _MIME.get(path.suffix.lower(), _BYTES), path.read_bytes
 
 
 class _Recorder:

@@ -237,10 +237,10 @@ def test_a_wrong_page_is_seen(window, out, wrong, monkeypatch):
         "transposed": lambda pixels: pixels.transpose(1, 0, 2),
         "pi left out": lambda pixels: pixels / np.float32(np.pi),
     }[wrong]
-    from baker.viewer import server
+    from baker.viewer import answers
 
-    plain = server.page_numbers
-    monkeypatch.setattr(server, "page_numbers", lambda pixels: plain(np.ascontiguousarray(change(pixels))))
+    plain = answers.page_numbers
+    monkeypatch.setattr(answers, "page_numbers", lambda pixels: plain(np.ascontiguousarray(change(pixels))))
     with served(out) as url:
         seen, expected = lit_pixels(Page(window, url, out).fresh())
     assert np.abs(seen - expected).max() > 3 * LEVELS

@@ -22,6 +22,11 @@ def cannot_move(folder: Path) -> bool:
     ----------
     folder : Path
         An existing folder; an absolute path without symbolic links.
+
+    Returns
+    -------
+    bool
+        True if the folder cannot be renamed.
     """
     if os.path.ismount(folder) or not os.access(folder.parent, os.W_OK | os.X_OK):
         return True

@@ -28,7 +28,20 @@ _FILE_NAME = re.compile(r"(?!\.{1,2}(/|$))[^/\\:]+(/(?!\.{1,2}(/|$))[^/\\:]+)*")
 
 
 def lies_inside(folder: Path, name: object) -> bool:
-    """Return whether `name` is a path inside `folder` and none of its parent folders is a symbolic link."""
+    """Return whether `name` is a path inside `folder` and none of its parent folders is a symbolic link.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    name : object
+        A value from a file, such as a manifest; anything but a relative path is refused.
+
+    Returns
+    -------
+    bool
+        True if `name` can be used as a path relative to `folder`.
+    """
     if not isinstance(name, str) or not name.isprintable() or not _FILE_NAME.fullmatch(name):
         return False
     parents = name.split("/")[:-1]

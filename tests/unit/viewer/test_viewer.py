@@ -63,8 +63,9 @@ def test_the_page_and_all_it_names_are_there(server, out):
     assert answer.getheader("Content-Type").startswith("text/html")
     assert "default-src 'self'" in answer.getheader("Content-Security-Policy")
     header = json.loads(ask(server, "/scene.json")[1])
-    named = ["static/style.css", "static/icon.svg", "static/main.js", header["three"]["file"], "geometry"]
-    named += ["status/0", "status/1", "page/irradiance/1", "page/ao/0", "image/0", "out/irradiance_1.exr"]
+    named = ["static/style.css", "static/icon.svg", "static/main.js", header["three"]["file"], "geometry.bin"]
+    named += ["status/0.bin", "status/1.bin", "page/irradiance/1.bin", "page/ao/0.bin"]
+    named += ["image/0.bin", "out/irradiance_1.exr"]
     for name in named:
         assert ask(server, f"/{name}")[0].status == 200, name
     for name in ("style.css", "icon.svg", "main.js"):
@@ -88,9 +89,9 @@ def test_the_page_and_all_it_names_are_there(server, out):
         "/three/../../../../../../etc/passwd",
         "//etc/passwd",
         "/etc/passwd",
-        "/page/irradiance/2",
-        "/page/irradiance/-1",
-        "/status/00",
+        "/page/irradiance/2.bin",
+        "/page/irradiance/-1.bin",
+        "/status/00.bin",
         "/static/",
         "/out/%00",
     ],
