@@ -2,7 +2,7 @@
 
 One surface point is chosen in each of a number of texels of bake a, and matched with a point on the surface
 of bake b. Each bake's map is looked up bilinearly at its own lightmap uv of the point. Bake b is the
-reference: a bias of +10 % means that bake a is brighter.
+reference: a bias of +10 % means that bake a is brighter than bake b.
 """
 
 from __future__ import annotations

@@ -327,8 +327,8 @@ class _Light(NamedTuple):
 def _light(plan: PagePlan, layers: list[PageLayer], rules: ComponentRules) -> _Light:
     """Return brightness and group of the valid texels of the sum of all layers.
 
-    Brightness is the mean of the components or, if they are signed, of their absolute values. If it is less
-    than a tenth of the mean brightness of the texel's group, it is raised to this value.
+    Brightness is the mean of the components or, if they are signed, of their absolute values. A brightness
+    below a tenth of the mean brightness of the texel's group is raised to this tenth.
     """
     total = np.zeros(int(plan.valid.sum()))
     for layer in layers:

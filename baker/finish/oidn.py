@@ -21,7 +21,8 @@ from baker.core.parallel import thread_count
 from baker.core.progress import Progress, report, silent
 from baker.core.stage import Stage
 
-# Largest scratch memory of the filter, MB. More memory allows larger tiles, which were not faster.
+# Largest scratch memory of the filter, MB. More memory allows larger tiles, but these did not make the filter
+# faster.
 MEMORY_MB = 1000
 
 
@@ -185,7 +186,8 @@ class LightmapDenoiser:
 def _new_device(library: Any, threads: int) -> Any:
     device = library.Device(library.OIDN_DEVICE_TYPE_CPU)
     device.set_int("numThreads", threads)
-    # Do not pin threads to cores: pinning would also affect other threads of the caller, and was not faster.
+    # Do not pin threads to cores: pinning would also affect other threads of the caller, and did not make the
+    # filter faster.
     device.set_bool("setAffinity", False)
     device.commit()
     _check(library, device)

@@ -1,4 +1,4 @@
-"""Packs chosen charts of a page on a smaller page, so that a filter processes few other texels."""
+"""Packs chosen charts of a page on a smaller page, so that a filter processes few texels of other charts."""
 
 from __future__ import annotations
 

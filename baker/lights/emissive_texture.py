@@ -174,7 +174,7 @@ class EmissiveTextures:
 def brightness(radiance: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean of R, G and B of radiances.
 
-    Luminance is not used, because parts that emit blue would get few samples.
+    This function replaces luminance, with which parts that emit blue would get few samples.
 
     Parameters
     ----------

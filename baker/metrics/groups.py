@@ -178,7 +178,7 @@ class GroupMetrics:
 def z_needed(n: float) -> float:
     """Return the number of standard errors that a deviation of n points must exceed to be significant.
 
-    It is larger for small n, because the standard error itself is then uncertain.
+    This number is larger for small n, because the standard error itself is then uncertain.
     """
     return _Z + _Z_FEW / max(n, 1)
 

@@ -40,7 +40,7 @@ def best_shift(
     noise: NDArray[np.float64] | None = None,
     better: float = _BETTER,
 ) -> tuple[int, int]:
-    """Return the shift by one texel with which the map fits the reference better, if there is one.
+    """Return the shift by one texel with which the map fits the reference better than without a shift.
 
     Parameters
     ----------

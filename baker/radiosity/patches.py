@@ -81,7 +81,8 @@ def build_patches(
     """Group texel entries into patches: square blocks whose side is a power of two.
 
     The side is the smallest that gives at most `max_patches` patches, but at most 256 texels. A chart smaller
-    than a block is still a separate patch, so an atlas of very many charts may have more patches.
+    than a block is still a separate patch, so an atlas of very many charts may have more than `max_patches`
+    patches.
 
     Parameters
     ----------
@@ -92,7 +93,7 @@ def build_patches(
         different patches. Entries of level 2 form smaller blocks, which add at most about `max_patches`
         patches.
     max_patches : int
-        Intended largest number of patches if narrow gaps had no smaller blocks.
+        Intended largest number of patches, without the additional patches in narrow gaps.
     link : (m, 2) int32, optional
         Pairs of neighbouring entries between which no surface lies (`radiosity.sides.Sides.link`). In charts
         with such pairs, a block is split into the parts that the pairs connect.

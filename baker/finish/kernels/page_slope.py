@@ -247,7 +247,8 @@ def match_lookups(value, chart, covered, offset, smallest, highest, moved, out, 
 
     A texel is changed only if all texels of this lookup are covered and in its chart. The difference from the
     result of `move_to_centre` is reduced by NOISY times the texel's mean, because the result of
-    `move_to_centre` is less noisy: it is computed from a plane through many texels.
+    `move_to_centre`, which is computed from a plane through many texels, has less noise than the value that
+    matches the lookup.
 
     Parameters
     ----------
@@ -341,8 +342,8 @@ def noisy_planes(value, chart, covered, offset, texel, radius, out):
     texel : (n,) int64
         Row * W + column of covered texels.
     radius : int
-        Half side of the window, texels. It is larger than for denoised pages, because slopes are fitted to
-        noisy values.
+        Half side of the window, texels. The window is larger than for denoised pages, because slopes are
+        fitted to noisy values.
     out : (n, 3, C) float32 output
         Value, slope per column and slope per row.
     """

@@ -30,8 +30,9 @@ def level_light(compared: ComparedPoints, equal_weight: float) -> NDArray[np.flo
     """Return (n,) float64: the light by which points are assigned to levels, a mean of reference and map.
 
     An error of this light moves points to a neighbouring level. This biases the errors in both levels. So the
-    reference has more weight where its noise is low, and the map elsewhere. Both have the same weight if the
-    relative standard error of the reference is `equal_weight`, which is about the error to be detected.
+    reference has more weight where its noise is low, and the map has more weight elsewhere. Both have the
+    same weight if the relative standard error of the reference is `equal_weight`, which is about the error to
+    be detected.
     """
     value, reference = compared.value.mean(axis=1), compared.reference.mean(axis=1)
     noise = np.where(np.isfinite(compared.spread), compared.spread, 0.0).mean(axis=1)
