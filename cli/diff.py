@@ -11,12 +11,18 @@ import typer
 from baker.cli.command import Run, command
 from baker.cli.outcome import report_outcome, write_failed, write_worst
 from baker.comparison.settings import DiffSettings
+from baker.core.readable import percent
+from baker.metrics.figures import FIGURES, figure_text
 
 if TYPE_CHECKING:
     from baker.comparison.compare import DiffReport
 
 # Number of objects, and of texels, that are shown without --verbose.
 _SHOWN = 3
+# Metrics in the columns of the table.
+_COLUMNS = ("texels", "bias", "colour_bias", "median", "p95", "colour_p95", "max", "nrmse", "flip")
+# Ratio of colour_p95 to p95 from which the last line mentions colours.
+_COLOUR = 1.5
 
 
 @command("diff", DiffSettings)
@@ -39,50 +45,100 @@ def write_text(found: DiffReport, stream: TextIO, *, verbose: int) -> None:
     for warning in found.warnings:
         stream.write(f"warning: {warning.message}\n")
     for entry in found.differences:
-        stream.write(f"{entry['what']}: {_brief(entry['a'], verbose)} | {_brief(entry['b'], verbose)}\n")
+        stream.write(f"{entry['what']}: {_difference(entry, verbose)}\n")
     for name, objects in (("A", found.only_in_a), ("B", found.only_in_b)):
         for entry in objects:
             stream.write(f"only in {name}: '{entry['object']}' (node {entry['node']})\n")
     if found.unmatched:
         stream.write(f"{found.unmatched} points of A are not on B's surface\n")
-    columns = ("texels", "bias", "median", "p95", "p99", "max", "nrmse", "flip")
-    stream.write(f"{'':12}" + "".join(f"{name:>11}" for name in columns) + "\n")
+    stream.write(f"{'':12}" + "".join(f"{name:>13}" for name in _COLUMNS) + "\n")
     for name, check in found.channels.items():
-        stream.write(f"{name:12}" + "".join(f"{_words(check.metrics[c], c):>11}" for c in columns) + "\n")
+        cells = "".join(f"{figure_text(column, check.metrics[column]):>13}" for column in _COLUMNS)
+        stream.write(f"{name:12}{cells}\n")
+    if verbose:
+        for column in _COLUMNS:
+            stream.write(f"  {column}: {FIGURES[column].phrase}\n")
     most = None if verbose else _SHOWN
-    for apart, name, entry in _furthest(found)[:most]:
-        bias = entry["channels"][name]["bias"]
-        whose = f"'{entry['object']}' (node {entry['node']})"
-        stream.write(f"object: {name} of {whose}: bias {bias:+.2%}, p95 {apart:.2%}\n")
+    for _, name, entry in _furthest(found)[:most]:
+        figures = entry["channels"][name]
+        shown = ", ".join(
+            f"{column} {figure_text(column, figures[column])}" for column in ("bias", "p95", "colour_p95")
+        )
+        stream.write(f"object: {name} of '{entry['object']}' (node {entry['node']}): {shown}\n")
     write_worst(found.worst[:most], stream)
     write_failed(found.verdicts, stream)
     verdict_text = ("passed" if found.passed else "FAILED") if found.verdicts else "done"
-    stream.write(f"{verdict_text} ({found.seconds:.0f} s)\n")
+    stream.write(f"{verdict_text}: {_sentence(found)} ({found.seconds:.0f} s)\n")
+
+
+def _sentence(found: DiffReport) -> str:
+    """Return one sentence about how far A is from B."""
+    parts = []
+    for name, check in found.channels.items():
+        metrics = check.metrics
+        if not metrics["rmse"]:
+            continue
+        side = "brighter" if metrics["bias"] > 0 else "darker"
+        text = f"{name} of A is {percent(abs(metrics['bias']))} {side} than of B on average"
+        text += f" and differs by less than {percent(metrics['p95'])} at 95 of 100 points"
+        if metrics["colour_p95"] > _COLOUR * metrics["p95"]:
+            text += f", but in colour by up to {percent(metrics['colour_p95'])} there"
+        parts.append(text)
+    if not parts:
+        return "A and B are equal at all compared points"
+    return "; ".join(parts)
 
 
 def _furthest(found: DiffReport) -> list[tuple[float, str, dict[str, Any]]]:
-    """Return (p95, channel, object) for each object with an error, the largest p95 first."""
+    """Return (error, channel, object) for each object with an error, the largest error first.
+
+    The error is the larger of p95 and colour_p95.
+    """
     apart = [
-        (float(figures["p95"]), name, entry)
+        (max(float(figures["p95"]), float(figures["colour_p95"])), name, entry)
         for entry in found.objects
         for name, figures in entry["channels"].items()
-        if figures["p95"]
+        if figures["p95"] or figures["colour_p95"]
     ]
     return sorted(apart, key=lambda item: -item[0])
 
 
+def _difference(entry: dict[str, Any], verbose: int) -> str:
+    """Return what differs in an entry of the manifests: for lights, each property in full."""
+    a, b = entry["a"], entry["b"]
+    if not entry["what"].startswith("lights."):
+        return f"{_brief(a, verbose)} | {_brief(b, verbose)}"
+    if not isinstance(a, dict) or not isinstance(b, dict):
+        name, light = ("A", a) if b is None else ("B", b)
+        return f"only in {name}: {_properties(light)}"
+    keys = [key for key in dict.fromkeys([*a, *b]) if a.get(key) != b.get(key)]
+    return "; ".join(f"{key} {_value(a.get(key), b.get(key))}" for key in keys)
+
+
+def _properties(light: Any) -> str:
+    if not isinstance(light, dict):
+        return json.dumps(light)
+    return ", ".join(f"{key} {_rounded(value)}" for key, value in light.items())
+
+
+def _value(a: Any, b: Any) -> str:
+    """Return two values with six digits, or with all digits if they differ only in the others."""
+    texts = _rounded(a), _rounded(b)
+    if texts[0] == texts[1]:
+        texts = json.dumps(a), json.dumps(b)
+    return f"{texts[0]} | {texts[1]}"
+
+
+def _rounded(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_rounded, value))}]"
+    return value if isinstance(value, str) else json.dumps(value)
+
+
 def _brief(value: Any, verbose: int) -> str:
-    if value is None:
-        return "-"
-    text = value if isinstance(value, str) else json.dumps(value)
+    text = _rounded(value)
     return text if verbose or len(text) <= 40 else f"{text[:37]}..."
-
-
-def _words(value: Any, name: str) -> str:
-    if value is None:
-        return "-"
-    if name == "texels":
-        return str(value)
-    if name == "flip":
-        return f"{value:.4f}"
-    return f"{value:+.2%}" if name == "bias" else f"{value:.2%}"

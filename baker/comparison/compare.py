@@ -28,7 +28,7 @@ from baker.core.result import Metrics, Result
 from baker.core.scene import SceneWarning
 from baker.core.stage import Stage
 from baker.io.bake.read_bake import StoredBake, read_bake
-from baker.metrics.error_metrics import METRICS, dark_floor, error_metrics
+from baker.metrics.error_metrics import METRICS, colour_error, dark_floor, error_metrics, relative_error
 from baker.metrics.limits import Verdict, evaluate_limits, parse_limits
 from baker.metrics.sample_texels import choose_texels
 from baker.metrics.texel_area import instance_map, one_surface_point
@@ -192,7 +192,7 @@ def compare(
     owner = sides.a.instance[points.triangle]
     size = first.atlas.resolution
     where = points.at(sides.a, "position") + origin
-    worst = worst_texels(first.scene.instances, size, pixel, owner, where, channels)
+    worst = worst_texels(first.scene.instances, size, pixel, owner, where, channels, _largest_error)
     worst = [entry for entry in worst if entry["error"] > 0]
     _add_texels_of_b(worst, first, second, sides, pixel, other)
     return DiffReport(
@@ -213,6 +213,20 @@ def compare(
         ],
         seconds=time.monotonic() - start,
     )
+
+
+def _largest_error(
+    value: NDArray[np.float64], reference: NDArray[np.float64], floor: float
+) -> NDArray[np.float64]:
+    """Return (n,) float64: the relative error, or the error of the worst colour if it is larger.
+
+    Two colours of equal mean differ only in the second one. It is not computed for channels whose components
+    are no colours.
+    """
+    error = relative_error(value, reference, floor)
+    if value.shape[1] != 3 or (reference < 0).any():
+        return error
+    return np.asarray(np.maximum(error, colour_error(value, reference, floor).max(axis=1)), np.float64)
 
 
 def _owners(bake: StoredBake, sides: ComparedSurfaces) -> NDArray[np.int32]:

@@ -155,12 +155,33 @@ def error_metrics(
     return found
 
 
+def colour_error(
+    value: NDArray[np.float64], reference: NDArray[np.float64], floor: float
+) -> NDArray[np.float64]:
+    """Return the colour error of each colour, |v_c - r_c| / max(r_c, 0.1 r, floor).
+
+    Parameters
+    ----------
+    value, reference : (n, C) float64
+        Values and reference values.
+    floor : float
+        Lower limit of the denominator, usually `dark_floor`.
+
+    Returns
+    -------
+    (n, C) float64
+        Colour errors.
+    """
+    mean = reference.mean(axis=1, keepdims=True)
+    scale = np.maximum(np.maximum(reference, _MIN_COLOUR * mean), max(floor, 1e-12))
+    return np.asarray(np.abs(value - reference) / scale, np.float64)
+
+
 def _colour_metrics(
     value: NDArray[np.float64], reference: NDArray[np.float64], floor: float
 ) -> dict[str, float]:
     mean = reference.mean(axis=1, keepdims=True)
-    scale = np.maximum(np.maximum(reference, _MIN_COLOUR * mean), max(floor, 1e-12))
-    error = np.abs(value - reference) / scale
+    error = colour_error(value, reference, floor)
     whole = np.maximum(np.maximum(reference.mean(axis=0), _MIN_COLOUR * mean.mean()), 1e-12)
     bias = (value - reference).mean(axis=0) / whole
     return {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,10 +22,13 @@ def worst_texels(
     owner: NDArray[np.int32],
     position: NDArray[np.float64],
     channels: Mapping[str, Any],
+    error_of: Callable[
+        [NDArray[np.float64], NDArray[np.float64], float], NDArray[np.float64]
+    ] = relative_error,
 ) -> list[dict[str, Any]]:
     """Return the ten texels with the largest significant error.
 
-    The significant error is the relative error minus three standard errors of the reference.
+    The significant error is the error minus three standard errors of the reference.
 
     Parameters
     ----------
@@ -42,6 +45,8 @@ def worst_texels(
     channels : mapping of str to object
         For each channel, by name, an object with the attributes `value`, `reference` and `standard_error`,
         (n, C) float64.
+    error_of : callable
+        error_of(value, reference, floor) returns the error of each texel, (n,) float64.
 
     Returns
     -------
@@ -51,7 +56,7 @@ def worst_texels(
     found = []
     for name, check in channels.items():
         floor = dark_floor(check.reference)
-        error = relative_error(check.value, check.reference, floor)
+        error = error_of(check.value, check.reference, floor)
         noise = np.where(np.isfinite(check.standard_error), check.standard_error, 0.0).mean(axis=1)
         sure = error - 3.0 * noise / np.maximum(check.reference.mean(axis=1), max(floor, 1e-12))
         for i in np.argsort(-sure, kind="stable")[:_COUNT]:

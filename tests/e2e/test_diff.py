@@ -210,3 +210,28 @@ def test_the_table(first, doubled, capsys):
     assert "irradiance" in text
     assert f"(node {doubled[1]}): bias +" in text
     assert "worst: irradiance of" in text
+
+
+def test_a_change_of_hue_at_equal_brightness_is_reported(first, tmp_path):
+    out = tmp_path / "out"
+    shutil.copytree(first, out)
+    pixels = decode_exr(out / "irradiance_0.exr").pixels.copy()
+    pixels *= np.float32([1.2, 1.0, 0.8])
+    encode_exr(out / "irradiance_0.exr", pixels / pixels.mean() * decode_exr(
+        first / "irradiance_0.exr").pixels.mean(), half=True, header={})  # fmt: skip
+    manifest = json.loads((out / "bake.json").read_text())
+    manifest["lights"][0]["intensity"] = [0.48, 0.4, 0.4]
+    (out / "bake.json").write_text(json.dumps(manifest))
+    code, found = told(out, first, "--no-flip")
+    assert code == 0
+    light = found["channels"]["irradiance"]
+    assert light["colour_p95"] > 0.1
+    assert found["worst"][0]["error"] > 0.1
+    stream = StringIO()
+    assert run(["diff", str(out), str(first), "--no-flip"], out=stream) == 0
+    text = stream.getvalue()
+    assert "but in colour by up to" in text
+    assert "intensity [0.48, 0.4, 0.4] | " in text
+    assert "object: irradiance of" in text
+    assert run(["diff", str(first), str(first), "--no-flip"], out=stream) == 0
+    assert "A and B are equal at all compared points" in stream.getvalue()
