@@ -7,7 +7,7 @@ Based on: Khronos Group, glTF 2.0 Specification, section 3.5; KHR_lights_punctua
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,6 +148,7 @@ def _instances(
     sources = document.root.children("meshes")
     poser = Poser(document)
     built: dict[_Key, _Built] = {}
+    users = _users(placed, sources)
     meshes: list[Mesh] = []
     instances: list[Instance] = []
     shown: list[SourceInstance] = []
@@ -158,14 +159,14 @@ def _instances(
         number = node.json.index("mesh", len(sources), "meshes")
         name = sources[number].string("name", f"mesh_{number}")
         # A skinned mesh is transformed by its joints, not by its node's matrix: build a mesh for each node.
-        key = number, node.index if "skin" in node.json else None
+        key = _key(node, number)
         if key not in built:
             arrays, found = read_primitives(document, sources[number], name, reader, lenient=lenient)
             posed = None
             if key[1] is not None:
                 arrays, posed = poser.pose(sources[number], arrays, node)
             mesh, defects = build_mesh(name, arrays, reader.materials)
-            warnings += found + defects
+            warnings += found + [_with_nodes(defect, users[key]) for defect in defects]
             if mesh is None:
                 warnings.append(
                     SceneWarning("no-triangles", "the mesh has no usable triangle and is left out", name)
@@ -185,6 +186,30 @@ def _instances(
             instances.append(Instance(node.index, label, made.mesh, node.matrix))
     kept = SourceScene(tuple(made.source for made in built.values()), tuple(shown)) if lenient else None
     return *_drop_unused(meshes, instances), kept
+
+
+def _key(node: Placed, number: int) -> _Key:
+    """Return the key of the mesh that is built for a node with mesh `number`."""
+    return number, node.index if "skin" in node.json else None
+
+
+def _users(placed: list[Placed], sources: list[JsonObject]) -> dict[_Key, list[str]]:
+    """Return the names of the nodes that use each mesh to build."""
+    users: dict[_Key, list[str]] = {}
+    for node in placed:
+        if "mesh" in node.json:
+            number = node.json.index("mesh", len(sources), "meshes")
+            name = node.json.string("name", "") or f"node {node.index}"
+            users.setdefault(_key(node, number), []).append(name)
+    return users
+
+
+def _with_nodes(defect: SceneWarning, nodes: list[str]) -> SceneWarning:
+    """Return a warning about a mesh with the first of the nodes that use the mesh, and their number."""
+    if nodes == [defect.object]:
+        return defect
+    more = f" and {len(nodes) - 1} more" if len(nodes) > 1 else ""
+    return replace(defect, message=f"{defect.message} (mesh of '{nodes[0]}'{more})")
 
 
 def _is_usable(node: Placed, extent: NDArray[np.float64], label: str, warnings: list[SceneWarning]) -> bool:

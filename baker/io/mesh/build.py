@@ -96,13 +96,14 @@ def _valid_triangles(
             return
         triangle, owner = triangle[good], owner[good]
         if code:
-            some = "1 triangle" if bad == 1 else f"{bad} triangles"
-            warnings.append(SceneWarning(code, f"{some} {what} left out", name))
+            some, verb = ("1 triangle", "is") if bad == 1 else (f"{bad} triangles", "are")
+            message = f"{some} {what} {verb} left out"
+            warnings.append(SceneWarning(code, message, name))
 
     keep(~(stitched & repeats), "", "")
     inside = in_range(triangle, start[owner], start[owner + 1])
     if not inside.all():
-        keep(inside, "index-range", "that name a vertex which does not exist")
+        keep(inside, "index-range", "with a vertex number that does not exist")
     usable = usable_vertices(position)
     if not usable.all():
         keep(usable[triangle].all(axis=1), "bad-vertices", "with NaN, infinite or huge coordinates")
@@ -110,7 +111,9 @@ def _valid_triangles(
     material = np.array([p.material for p in primitives], np.int32)[owner]
     double_sided = np.array([materials[p.material].double_sided for p in primitives], bool)[owner]
     keep(
-        ~duplicates(position, triangle, material, double_sided), "duplicate-faces", "that repeat another face"
+        ~duplicates(position, triangle, material, double_sided),
+        "duplicate-faces",
+        "with the corners of another",
     )
     return [triangle[owner == i] - start[i] for i in range(len(primitives))]
 

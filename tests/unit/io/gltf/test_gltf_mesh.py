@@ -114,6 +114,21 @@ def test_bad_triangles_are_counted_by_kind_and_their_vertices_dropped(tmp_path):
     assert {w.object for w in scene.warnings} == {"mesh_0"}
 
 
+def test_a_warning_about_left_out_triangles_names_the_nodes_and_the_count(tmp_path):
+    triangle = np.concatenate([QUAD_TRIANGLE, QUAD_TRIANGLE[:1], [[0, 0, 1]], [[1, 1, 2]]]).astype(np.uint32)
+    builder = GltfBuilder()
+    mesh = builder.mesh(builder.primitive(QUAD, triangle, NORMAL=QUAD_NORMAL), name="planks")
+    builder.node(mesh=mesh, name="floor")
+    builder.node(mesh=mesh, translation=[3, 0, 0])
+    found = codes(load_scene(write(tmp_path / "a.glb", builder)))
+    assert found["zero-area"] == "2 triangles without area are left out (mesh of 'floor' and 1 more)"
+    assert found["duplicate-faces"].startswith("1 triangle with the corners of another is left out (mesh of")
+    builder.json["nodes"][0]["name"] = "planks"
+    del builder.json["nodes"][1]["mesh"]
+    found = codes(load_scene(write(tmp_path / "b.glb", builder)))
+    assert found["zero-area"] == "2 triangles without area are left out"
+
+
 @pytest.mark.parametrize(
     ("same_material", "double_sided", "left"), [(True, True, 1), (True, False, 2), (False, True, 2)]
 )
