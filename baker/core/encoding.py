@@ -8,7 +8,7 @@ key of the configuration file and a row of the settings page.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -296,11 +296,23 @@ def encodings_in_words() -> str:
     for name in ENCODINGS.names():
         if name != ALWAYS_WRITTEN:
             names.setdefault(ENCODINGS.require(name, "encoding").components, []).append(f"`{name}`")
-    words: dict[tuple[int, ...], str] = {(3,): "three colours", (1,): "one value per texel"}
+    words: dict[tuple[int, ...], str] = {
+        (3,): "three colours",
+        (1,): "one value per texel",
+        (1, 3): "one value per texel or three colours",
+    }
     return "; ".join(
-        f"{', '.join(some)} for maps with {words.get(count, 'any components')}"
+        f"{', '.join(some)} for maps with {words.get(count) or _numbers(count) + ' components'}"
         for count, some in sorted(names.items(), reverse=True)
     )
+
+
+def _numbers(count: Sequence[int]) -> str:
+    """Return numbers of components as text, such as "1, 2 or 4"."""
+    if len(count) > 2 and list(count) == list(range(count[0], count[-1] + 1)):
+        return f"{count[0]} to {count[-1]}"
+    *first, last = map(str, count)
+    return f"{', '.join(first)} or {last}" if first else last
 
 
 def encoding_options() -> dict[str, type[EncodingOptions]]:

@@ -11,17 +11,14 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-MANIFEST_NAME = "bake.json"
+from baker.io.bake.read_manifest import read_manifest
+
 SCENE_NAME = "scene.glb"
 DESCRIPTION_NAME = "lightmap.json"
+# Types of lights that every reader of KHR_lights_punctual knows.
+STANDARD_LIGHTS = ("directional", "point", "spot")
 # Key of the manifest and of `lightmap.json`.
 EXPOSURE_KEY = "suggested_exposure"
-
-
-def read_manifest(bake: Path) -> dict[str, Any]:
-    """Return the manifest of a bake."""
-    manifest: dict[str, Any] = json.loads((bake / MANIFEST_NAME).read_text("utf-8"))
-    return manifest
 
 
 def irradiance_pages(manifest: dict[str, Any]) -> list[dict[str, Any]]:
@@ -74,7 +71,11 @@ def link_file(source: Path, target: Path) -> None:
 def place_bake(bake: Path, target: Path) -> dict[str, Any]:
     """Put scene, irradiance pages and `lightmap.json` into `target`; return the JSON content."""
     description = describe(read_manifest(bake))
-    link_file(bake / SCENE_NAME, target / SCENE_NAME)
+    document, binary = _read_glb(bake / SCENE_NAME)
+    if _replace_lights(document):
+        (target / SCENE_NAME).write_bytes(_glb(document, binary))
+    else:
+        link_file(bake / SCENE_NAME, target / SCENE_NAME)
     for page in description["pages"]:
         link_file(bake / page["file"], target / page["file"])
     write_json(target / DESCRIPTION_NAME, description)
@@ -127,6 +128,7 @@ def place_named_scene(bake: Path, target: Path) -> dict[str, Any]:
     """
     description = describe(read_manifest(bake))
     document, binary = _read_glb(bake / SCENE_NAME)
+    _replace_lights(document)
     nodes = document.get("nodes", [])
     for index, node in enumerate(nodes):
         node["name"] = unique_name(str(node.get("name", "node")), index)
@@ -156,6 +158,19 @@ def unique_name(name: str, node: int) -> str:
     safe = re.sub(r"[^0-9A-Za-z_]+", "_", name).strip("_") or "node"
     # Keep names short, because Blender truncates them to 63 bytes.
     return f"{safe[:48]}_n{node}"
+
+
+def _replace_lights(document: dict[str, Any]) -> bool:
+    """Replace lights whose type is not in KHR_lights_punctual by black point lights; return whether any was.
+
+    Loaders refuse a file with an unknown type. The pages contain the light of all lights.
+    """
+    table = document.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", [])
+    foreign = [number for number, light in enumerate(table) if light.get("type") not in STANDARD_LIGHTS]
+    for number in foreign:
+        name = {"name": table[number]["name"]} if "name" in table[number] else {}
+        table[number] = {**name, "type": "point", "intensity": 0.0}
+    return bool(foreign)
 
 
 def _read_glb(path: Path) -> tuple[dict[str, Any], bytes]:

@@ -75,7 +75,7 @@ def _to_rgba(image: Image) -> NDArray[np.uint8]:
     """Convert an image to RGBA in strips of rows, so that memory holds at most two copies of it."""
     width, height = image.size
     step = 2 if max(width, height) > LARGEST_IMAGE_SIDE and min(width, height) > 1 else 1
-    pixels = np.empty((height // step, width // step, 4), np.uint8)
+    pixels = np.zeros((height // step, width // step, 4), np.uint8)
     for top in range(0, height // step * step, _STRIP):
         rows = _rows(image, top, min(top + _STRIP, height // step * step))
         pixels[top // step : (top + len(rows)) // step] = rows if step == 1 else _halved(rows)

@@ -65,7 +65,7 @@ from baker.pathtracer.path_blocks import (
     close_gaps,
     trace_blocks,
     unsigned,
-)
+)  # fmt: skip
 from baker.pathtracer.rng import random_lanes, spread_lanes
 from baker.pathtracer.scene import BASE_COLOUR, EMISSION, EMITTER, FACE, MATERIAL, SHINES, TEXTURED, TWO_SIDED
 from baker.pathtracer.shadow_rays import cast_packet, cast_to_lights
@@ -125,11 +125,7 @@ def see_emitter(s, base, lane, surface, lights, prim, mode, power, value):
     mode, power : `Estimator.aim` and `.power`
     """
     value[0] = value[1] = value[2] = 0.0
-    dx, dy, dz = (
-        s[base + DIR_X * _L + lane],
-        s[base + DIR_Y * _L + lane],
-        s[base + DIR_Z * _L + lane],
-    )
+    dx, dy, dz = s[base + DIR_X * _L + lane], s[base + DIR_Y * _L + lane], s[base + DIR_Z * _L + lane]
     facing = dx * surface[prim, FACE] + dy * surface[prim, FACE + 1] + dz * surface[prim, FACE + 2]
     if facing >= 0.0 and surface[prim, TWO_SIDED] == 0.0:
         return
@@ -171,7 +167,6 @@ def start_lanes(s, words, base, where, toward, normal, begin, following, samples
     """Start the paths of numbers `following` to `following` + 7 in a block.
 
     Paths start at surface points, or as camera rays.
-
 
     s, words : blocks, float32 and uint32; base : index of the block's first number
     where, toward, normal : (m, k, 3) float64; begin, at_surface : see `trace_paths`
@@ -248,10 +243,8 @@ def turn_alone(path, row, lane, s, words, base, hemisphere, value):
     hemisphere : `Estimator.hemisphere`
     """
     choice = np.float64(words[base + LOBE * _L + lane]) * _INV_2_32
-    u, w = (
-        np.float64(s[base + U_DIRECTION * _L + lane]) - 1.0,
-        np.float64(s[base + W_DIRECTION * _L + lane]) - 1.0,
-    )
+    u = np.float64(s[base + U_DIRECTION * _L + lane]) - 1.0
+    w = np.float64(s[base + W_DIRECTION * _L + lane]) - 1.0
     alive = scatter(path, row, lane, hemisphere, choice, u, w, value)
     survive = 1.0
     if alive and s[base + BOUNCES * _L + lane] >= _f(SURE):

@@ -43,7 +43,7 @@ def suggested_exposure(
     """
     flat = irradiance.reshape(-1, 3)
     weights = np.array(LUMINANCE_WEIGHTS, np.float32) / np.float32(math.pi)
-    radiance = np.empty(len(pixel), np.float32)
+    radiance = np.zeros(len(pixel), np.float32)
     for start in range(0, len(pixel), _BLOCK):
         block = slice(start, start + _BLOCK)
         # A sum in a fixed order instead of a matrix product, whose last bits depend on the library.

@@ -120,7 +120,7 @@ def test_an_option_is_in_help_and_docs(run):
     meaning = "Steps of the toy format for a value of 1."
     row = f"| `--toy-steps` | `toy_steps` | `N` |  | 1 to 64 | `8` | {meaning} |"
     assert row in page
-    assert "`toy` (any)" in page
+    assert "`toy` for maps with one value per texel or three colours" in page
 
 
 @pytest.mark.parametrize("number", [1, 3])

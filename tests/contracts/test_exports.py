@@ -294,3 +294,26 @@ def test_unlit_holds_light_times_albedo(bake, tmp_path):
         assert np.abs(stored - np.minimum(curve, 1.0)).max() <= 0.5 / 255 + 1e-6
         clipped += int((linear.max(axis=2) > 1.0).sum())
     assert clipped <= 0.01 * 2 * SIZE * 12 + 1
+
+
+@pytest.mark.parametrize("name", ["three", "godot"])
+def test_lights_that_loaders_do_not_know_are_replaced(name, tmp_path):
+    bake = result(tmp_path)
+    out = tmp_path / "out"
+    write_bake(bake, out)
+    text = (out / "scene.glb").read_bytes()
+    (length,) = struct.unpack_from("<I", text, 12)
+    document, rest = json.loads(text[20 : 20 + length]), text[20 + length :]
+    lights = [{"type": "wallwash", "name": "wash", "spread": 2.0}, {"type": "spot", "intensity": 3.0}]
+    document["extensions"] = {"KHR_lights_punctual": {"lights": lights}}
+    changed = json.dumps(document).encode()
+    changed += b" " * (-len(changed) % 4)
+    head = struct.pack("<IIIII", 0x46546C67, 2, 20 + len(changed) + len(rest), len(changed), 0x4E4F534A)
+    (out / "scene.glb").write_bytes(head + changed + rest)
+    (out / name).mkdir()
+    EXPORTS.require(name, "export").write(out, out / name)
+    data = (out / name / "scene.glb").read_bytes()
+    (length,) = struct.unpack_from("<I", data, 12)
+    written = json.loads(data[20 : 20 + length])["extensions"]["KHR_lights_punctual"]["lights"]
+    assert written == [{"name": "wash", "type": "point", "intensity": 0.0}, lights[1]]
+    assert (out / "scene.glb").read_bytes() == head + changed + rest

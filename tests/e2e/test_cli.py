@@ -1,4 +1,4 @@
-"""The command line: flags made from settings, configuration files, exit codes, JSON, progress, start time."""
+"""The command line: flags made from settings, configuration files, exit codes and JSON."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import os
 import re
 import subprocess
 import sys
-import time
 import tomllib
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,16 +19,13 @@ import pytest
 
 import baker
 from baker.cli.app import run
-from baker.cli.bake_plan import BakePlan
 from baker.cli.commands import COMMANDS
 from baker.cli.fields import group_of
 from baker.cli.flags import FlagStream
-from baker.cli.progress import Reporter
 from baker.cli.report import write_summary
 from baker.core.encoding import encoding_options
 from baker.core.errors import Cancelled, InputError, SettingsError
 from baker.core.settings import BakeSettings
-from baker.core.stage import COMPILING
 from baker.io.bake.lock import OutputLock
 
 MANIFEST = {
@@ -427,140 +423,6 @@ def test_a_shell_completes_commands_and_flags(words, at, offered):
         [sys.executable, "-m", "baker"], capture_output=True, text=True, check=True, env=asked
     )
     assert done.stdout.split() == [offered]
-
-
-def test_plain_progress_is_a_line_now_and_then():
-    clock = iter(range(100))
-    stream = io.StringIO()
-    reporter = Reporter(quiet=False, stopped=lambda: False, stream=stream, clock=lambda: float(next(clock)))
-    with reporter:
-        answers = [reporter("gather", k / 10, "23.1 Mrays/s") for k in range(11)]
-    assert not any(answers)
-    lines = stream.getvalue().splitlines()
-    # The fake clock advances one second between reports; a line is printed at most every three seconds.
-    assert lines[0] == "gather:  20 %  23.1 Mrays/s  8 s left"
-    assert len(lines) == 3
-
-
-def test_terminal_gets_a_bar_with_stage_rate_and_time_left():
-    stream = Terminal()
-    with Reporter(quiet=False, stopped=lambda: False, stream=stream) as reporter:
-        reporter("gather", 0.25, "23.1 Mrays/s")
-        reporter("solve", 0.5, "")
-        time.sleep(0.15)
-    assert "gather" in stream.getvalue() or "solve" in stream.getvalue()
-    assert "50%" in stream.getvalue()
-
-
-def plan_lines(reports, expected):
-    """Return the lines that a bake prints for (seconds, stage, fraction, detail)."""
-    now, stream = [0.0], io.StringIO()
-    reporter = Reporter(quiet=False, stopped=lambda: False, stream=stream, clock=lambda: now[0])
-    with reporter:
-        reporter.follow(BakePlan(expected, clock=lambda: now[0]))
-        for seconds, stage, fraction, detail in reports:
-            now[0] = seconds
-            reporter(stage, fraction, detail)
-    return stream.getvalue().splitlines()
-
-
-def test_a_bake_has_one_progress_with_the_time_left_of_all_stages():
-    expected = {"load": 1.0, "gather": 6.0, "finish": 3.0}
-    lines = plan_lines(
-        [(4, "load", 0.5, ""), (8, "gather", 0.0, ""), (20, "gather", 0.5, "23.1 Mrays/s"),
-         (32, "finish", 0.0, ""), (35, "denoise", 0.5, ""), (40, "finish", 0.5, ""), (48, "finish", 1.0, "")],
-        expected,
-    )  # fmt: skip
-    shares = [int(re.search(r"(\d+) %", line)[1]) for line in lines]
-    assert shares == [5, 10, 40, 70, 70, 85, 100]
-    # Half of the gather took 12 s, so the other half is expected to take 12 s. Finishing is expected to be as
-    # slow as loading.
-    assert lines[2].startswith("bake: 40 %  gather  23.1 Mrays/s  ")
-    left = [float(re.search(r"(\d+) s left", line)[1]) for line in lines]
-    assert 12 + 3 < left[2] <= 12 + 3 * 8
-    assert left[4] == pytest.approx(left[3] - 3, abs=1)
-    assert left[-1] == 0
-    # The bake takes 48 s. The estimate is within a factor of two from the middle on.
-    assert all(0.5 < (48 - then) / value < 2 for then, value in ((32, left[3]), (40, left[5])))
-
-
-def test_compiling_is_labelled_and_does_not_spoil_the_estimate():
-    expected = {"load": 1.0, "texels": 1.0, "gather": 8.0}
-    lines = plan_lines(
-        [(1, "load", 0.0, ""), (4, "texels", 0.0, COMPILING), (40, "compile", 0.5, COMPILING),
-         (44, "compile", 0.5, COMPILING), (48, "gather", 0.0, "")],
-        expected,
-    )  # fmt: skip
-    assert lines[0] == "bake: 10 %  texels  compiling kernels, first run only"
-    assert lines[1] == "bake: 10 %  compiling kernels, first run only"
-    assert 8 <= float(re.search(r"(\d+) s left", lines[2])[1]) < 20
-    assert len(lines) == 3
-
-
-@pytest.mark.parametrize("width", [40, 80])
-def test_the_bar_of_a_bake_fits_the_terminal(width, monkeypatch):
-    monkeypatch.setenv("COLUMNS", str(width))
-    stream = Terminal()
-    with Reporter(quiet=False, stopped=lambda: False, stream=stream) as reporter:
-        reporter("start", 0.0)
-        reporter.follow(BakePlan({"gather": 4.0, "finish": 1.0}))
-        reporter("gather", 0.5, "23.1 Mrays/s")
-        time.sleep(0.15)
-    drawn = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", stream.getvalue()).replace("\r", "\n").splitlines()
-    bars = [line.rstrip() for line in drawn if "bake" in line]
-    assert any("40%" in line and "left" in line for line in bars), drawn
-    assert all(len(line) <= width for line in drawn)
-    assert width < 80 or bars[-1].endswith("gather  23.1 Mrays/s")
-
-
-def test_progress_answers_the_stop_flag():
-    with Reporter(quiet=True, stopped=lambda: True) as reporter:
-        assert reporter("gather", 0.1)
-
-
-@pytest.mark.timed
-def test_help_is_quick_and_imports_nothing_heavy():
-    # Take the fastest of three runs, because other processes may slow single runs.
-    seconds = []
-    for _ in range(3):
-        began = time.perf_counter()
-        done = subprocess.run(
-            [sys.executable, "-m", "baker.cli", "--help"], capture_output=True, text=True, check=True
-        )
-        seconds.append(time.perf_counter() - began)
-    assert min(seconds) < 0.5
-    assert all(name in done.stdout for name in ("bake", "ao", "inspect"))
-    code = "import sys; from baker.cli.app import run; run(['--help']); print(*sys.modules)"
-    loaded = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    ).stdout.split()
-    assert not {"numpy", "numba", "pydantic", "scipy", "baker.core.settings"} & set(loaded)
-
-
-def test_json_stdout_is_kept_clean_of_what_libraries_print():
-    code = (
-        "import os, sys, types\n"
-        "def look(path, **_):\n    os.write(1, b'library noise')\n    return {'kind': 'x'}\n"
-        "sys.modules['baker.io.inspect'] = types.SimpleNamespace(inspect_path=look)\n"
-        "from baker.cli.app import main\nmain()\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code, "inspect", "a", "--json"], capture_output=True, check=True
-    )
-    assert json.loads(done.stdout) == {"kind": "x"}
-    assert b"library noise" in done.stderr
-
-
-def test_full_or_closed_standard_output_is_no_traceback():
-    version = [sys.executable, "-m", "baker.cli", "--version"]
-    with Path("/dev/full").open("w") as full:
-        done = subprocess.run(version, stdout=full, stderr=subprocess.PIPE, text=True)
-    assert done.returncode == 4
-    assert done.stderr == "baker: the disk is full; free some space, or write elsewhere with -o\n"
-    with subprocess.Popen(version, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as closed:
-        closed.stdout.close()
-        assert closed.stderr.read() == ""
-    assert closed.returncode == 0
 
 
 def test_a_bake_into_a_folder_that_another_run_holds_is_refused(pipeline, command, tmp_path, capsys):

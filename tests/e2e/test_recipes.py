@@ -169,7 +169,7 @@ def test_the_commands_of_the_image(tmp_path):
     for old, new in (
         ("interior", "cornell"),
         ("/src", str(ROOT)),
-        ("/tmp/warm", "warm"),
+        ("/var/warm", "warm"),
         ('"$NUMBA_CACHE_DIR"', "cache"),
     ):
         assert old in warm
