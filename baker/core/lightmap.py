@@ -133,8 +133,8 @@ class BakeResult(Result):
         Number of texels of each instance, in the order of `scene.instances`.
     statistics : dict of channel to {min, max, mean, clipped, invalid}
     suggested_exposure : float or None
-        Factor on albedo x E / pi for a display: 90 % of the lit texels are then at most 0.5, 1 = white. It is
-        1 for a black bake, and None without the channel irradiance.
+        Factor on albedo x E / pi for a display: the median of the lit texels is then 0.18, 1 = white. It is 1
+        for a black bake, and None without the channel irradiance.
     timings : dict of stage to seconds
     rays : dict of stage to number of rays
     solve : dict

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from baker.core.colour import LUMINANCE_WEIGHTS
 
-# This share of the lit texels, 0 to 1, is shown at most at this display level, linear, 1 = white.
-SHARE = 0.9
-LEVEL = 0.5
+# Display level, linear, 1 = white, at which the median of the lit texels is shown: mid grey. A higher
+# quantile makes rooms too dark, because many texels may be on outer walls in the sun.
+LEVEL = 0.18
 # The result has this number of significant digits, and at most this value, which a 32-bit float can hold.
 _DIGITS = 4
 _LARGEST = 1e30
@@ -22,7 +22,7 @@ _BLOCK = 1 << 20
 def suggested_exposure(
     irradiance: NDArray[np.float32], pixel: NDArray[np.int64], albedo: NDArray[np.floating]
 ) -> float:
-    """Return the factor on radiance (cd/m2) with which 90 % of the lit texels are at most at half of white.
+    """Return the factor on radiance (cd/m2) with which the median of the lit texels is mid grey.
 
     The radiance of a texel is the luminance of albedo x E / pi. A texel is lit if its radiance is above 0.
 
@@ -38,8 +38,8 @@ def suggested_exposure(
     Returns
     -------
     float
-        `LEVEL` divided by the quantile `SHARE` of the radiance, with linear interpolation, rounded to four
-        significant digits; 1 if no texel is lit.
+        `LEVEL` divided by the median of the radiance, rounded to four significant digits; 1 if no texel is
+        lit.
     """
     flat = irradiance.reshape(-1, 3)
     weights = np.array(LUMINANCE_WEIGHTS, np.float32) / np.float32(math.pi)
@@ -52,4 +52,4 @@ def suggested_exposure(
     lit = radiance[radiance > 0.0]
     if not lit.size:
         return 1.0
-    return min(float(f"{LEVEL / float(np.quantile(lit, SHARE)):.{_DIGITS}g}"), _LARGEST)
+    return min(float(f"{LEVEL / float(np.median(lit)):.{_DIGITS}g}"), _LARGEST)
