@@ -4,11 +4,12 @@
     python benchmarks/against_cycles.py --python elsewhere/bin/python --markdown
 
 This benchmark needs Blender as a Python module (Python 3.11) and Mitsuba 3, which needs LLVM 17 or newer. If
-LLVM is not found, set DRJIT_LIBLLVM_PATH to its library. Install both in a separate environment from `baker`.
+LLVM is not found, set DRJIT_LIBLLVM_PATH to its library. Install Blender and Mitsuba in an environment
+separate from that of `baker`.
 
-The two programs bake alternately. Mitsuba's path tracer, which is independent of both, computes the truth at
-random texels. The error of a texel is |value / truth - 1|, where value and truth are means of R, G and B.
-Texels inside geometry are left out: their truth is below 1 % of the median.
+`baker` and Cycles bake alternately. The truth is the irradiance that Mitsuba's path tracer computes at random
+texels. The error of a texel is |value / truth - 1|, where value and truth are means of R, G and B. Texels
+whose truth is below 1 % of the median truth are left out, because they lie inside geometry.
 """
 
 from __future__ import annotations
@@ -98,7 +99,7 @@ def _options(argv: list[str] | None) -> argparse.Namespace:
 def _compare(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     cache, size = folder / "kernels", options.resolution
     flags = ["--resolution", str(size), "--channels", "irradiance", "--dtype", "float"]
-    # Unwrap and compile in a first bake. All other bakes, and Cycles, use the uv of this bake.
+    # Unwrap the scene and compile the kernels in a first bake. All later bakes of both programs use its uv.
     bake(options.scene, folder / "first", flags=[*flags, "--samples", "4"], cache=cache)
     scene = folder / "first" / "scene.glb"
     flags += ["--uv", "keep"]
@@ -269,8 +270,9 @@ def _tables(result: dict[str, Any], *, markdown: bool) -> str:
 def _equal(rows: list[dict[str, Any]]) -> list[tuple[str | float, ...]]:
     """Return a row for each setting of Cycles, with the fastest setting of baker that is no less accurate.
 
-    Settings are compared by their median error. The ratio of the times is a lower bound, because Cycles' time
-    is the time of the bake alone, and baker's time that of the whole process.
+    A setting of baker is no less accurate if its median error is no larger. The last column is Cycles' time
+    divided by baker's time. It is a lower bound, because Cycles' time is that of the bake alone, and baker's
+    time is that of the whole process.
     """
     ours = [row for row in rows if row["program"] == "baker"]
     found: list[tuple[str | float, ...]] = []

@@ -3,11 +3,11 @@
     pip install -e '.[mitsuba]'        llvm_ad_rgb needs LLVM 17 or newer, Debian: libllvm19
     python benchmarks/against_mitsuba.py --into docs/PERFORMANCE.md
 
-Both programs run alternately. They trace the same flat Lambertian triangles from the same camera, with MIS
-and one shadow ray at every vertex. Paths end after `SEGMENTS` closest-hit rays, without Russian roulette, so
-both cast the same number of rays. The rays of the reference path tracer are counted; Mitsuba does not count
-rays, so the same number per path is assumed. Occlusion rays start at the first hits of camera rays. They are
-cosine-weighted and end after a tenth of the scene's diagonal. Compilation is not timed.
+The reference path tracer and Mitsuba run alternately. They trace the same flat Lambertian triangles from the
+same camera, with MIS and one shadow ray at every vertex. Paths end after `SEGMENTS` closest-hit rays, without
+Russian roulette, so both cast the same number of rays. The rays of the reference path tracer are counted;
+Mitsuba does not count rays, so the same number per path is assumed. Occlusion rays start at the first hits of
+camera rays. They are cosine-weighted and end after a tenth of the scene's diagonal. Compilation is not timed.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def measure(path: Path, spp: int, repeat: int) -> dict[str, Any]:
-    """Return rates in million rays per second, one of each repetition, and mean results of both programs."""
+    """Return the Mrays/s of each repetition, and the mean radiance and AO, of both programs."""
     from mitsuba_scene import flat, mitsuba_camera, mitsuba_scene
 
     threads = thread_count(None)
@@ -108,7 +108,7 @@ def measure(path: Path, spp: int, repeat: int) -> dict[str, Any]:
             share = _mitsuba_ao(other, where[0][:, 0], where[2][:, 0], reach, turn)
             theirs_open = perf_counter() - start
             if turn == 0:
-                # Discard the first turn, which compiles.
+                # Discard the first repetition, because it includes compilation.
                 continue
             segments = estimate.segments / 1e6
             rates["segments"].append(segments / own)

@@ -34,13 +34,15 @@ from baker.trace.packets import (
     trace_lanes,
 )
 
-# Number of rows of Embree's packet layout that describe the ray.
+# Number of rows of a packet that hold the rays. A row is one member of Embree's `RTCRayHit16`, such as
+# `org_x`, for all lanes.
 RAY_ROWS = 12
 # Row of the hit's geometry ID, the only row of the hit that must be reset before each call.
 GEOM_ROW = 18
 # Number of texels in a tile.
 TILE = 256
-# Largest number of rays that are stored for `ready`, about 50 bytes each.
+# Approximate limit of the number of rays that are created in advance for the loop `ready`. A ray takes about
+# 50 bytes.
 MOST_READY = 4_000_000
 
 
@@ -56,7 +58,7 @@ def _aim_hemisphere(rays, words, origin, normal, group, lanes, net, shared, seed
 def _aim_emitter(rays, on, origin, normal, group, lanes, net, shared, seeds, s, corner, cumulative):  # type: ignore[no-untyped-def]
     """Aim the rays of a packet at points distributed uniformly over the emitters' area.
 
-    As in a bake, a lane is inactive if the emitter or the point faces away.
+    As in a bake, a lane is inactive if the front of the emitter or the surface at the point faces away.
 
     rays : float32 rows of the packet, output
     on : (PACKET_WIDTH,) int32 output, -1 for active lanes
@@ -178,7 +180,7 @@ class _Tile:
 
 
 class BareRays:
-    """Stored rays of one kind from texels of all parts of the pages, which can be traced repeatedly.
+    """Rays of one kind, which can be traced repeatedly. They start at texels of every k-th tile of the scene.
 
     Parameters
     ----------
@@ -194,8 +196,8 @@ class BareRays:
         Trace occlusion rays instead of closest-hit rays.
     distance : float
         Length of the rays, metres; inf for unlimited.
-    to_emitters : bool
-        Aim at emissive triangles instead of over the hemisphere.
+    to_emitters : bool Aim the rays at emissive triangles. Otherwise, they are distributed over the
+    hemisphere.
     """
 
     def __init__(
@@ -287,7 +289,8 @@ class BareRays:
 def _emitter_corners(emitters: Emitters, *, wanted: bool) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return the geometry of M emissive triangles; M = 0 if `wanted` is false.
 
-    Returns (M, 12) float32, three corners and the normal, and (M,) float32, the cumulative share of area.
+    Returns (M, 12) float32, the three corners and the normal of each triangle, and (M,) float32, the
+    cumulative share of the triangles in the total area.
     """
     if not wanted or not len(emitters.row):
         return np.zeros((0, 12), np.float32), np.zeros(0, np.float32)

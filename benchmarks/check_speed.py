@@ -26,7 +26,7 @@ CHARTS = 12
 def bumpy_sheet(side: int = SIDE) -> bytes:
     """Return a GLB file of one wavy sheet.
 
-    Its uv consists of square charts, whose distance is a few texels on a page of 2048 texels a side.
+    Its uv consists of square charts with gaps of a few texels on a page of 2048 x 2048 texels.
     """
     cells = side - 1
     per_chart = cells // CHARTS
@@ -77,7 +77,7 @@ def pack(position: np.ndarray, uv: np.ndarray, triangle: np.ndarray) -> bytes:
 
 
 def kit_pieces(count: int = 100) -> list[str]:
-    """Return `count` paths of small kit pieces, repeated if there are fewer pieces."""
+    """Return `count` paths of small kit pieces; if there are fewer pieces, paths are repeated."""
     pieces = sorted(p for p in KIT.rglob("*.glb") if p.parts[-2].startswith(("kaykit", "kenney")))
     return [str(pieces[k % len(pieces)]) for k in range(count)]
 

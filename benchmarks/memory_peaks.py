@@ -1,9 +1,9 @@
-"""Prints a table of estimated (`baker/core/budget.py`) and measured peaks of a bake's memory.
+"""Prints a table of the peak memory of bakes, estimated by `baker/core/budget.py` and measured.
 
 python benchmarks/memory_peaks.py
 
 Each bake runs in a separate process, whose largest resident memory Linux reports. All bakes together take
-some minutes. `tests/unit/core/test_budget.py` tests small cases.
+some minutes. `tests/unit/core/test_budget.py` compares estimate and measurement for small bakes.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Measures the ray rates of a bake's stages and of the loops of `bare`, alternately in one process."""
+"""Measures the ray rates of a bake's stages and of the loops of `bare.py`, alternately in one process."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from baker.pipeline.transport import trace_transport
 from baker.radiosity.inside_geometry import find_inside_geometry
 from baker.uv.unwrap import unwrap_scene
 
-# For each stage of the bake, the kind of bare rays that it is compared with.
+# {stage of the bake: kind of rays of `bare.py` with whose rate the rate of the stage is compared}.
 BESIDE = {
     Stage.FINAL_GATHER: "closest hit",
     Stage.FORM_FACTORS: "closest hit",
@@ -129,7 +129,7 @@ def _turn(world: PreparedScene) -> dict[str, tuple[float, int]]:
     record = Record(silent)
     trace_transport(world, {"irradiance": CHANNELS.get("irradiance")}, record)
     trace_transport(world, {"ao": CHANNELS.get("ao")}, record)
-    # Measure the search for points inside geometry as well, which otherwise runs only in `prepare_scene`.
+    # Measure the search for points inside geometry, too. In a bake, this search is a part of `prepare_scene`.
     start = perf_counter()
     _, cast = find_inside_geometry(world.texels, world.job, world.hit_kind)
     record.timings[Stage.INSIDE_GEOMETRY] = perf_counter() - start

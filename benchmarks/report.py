@@ -12,7 +12,7 @@ STAGES = (
     Stage.LOAD, Stage.UNWRAP, Stage.TEXELS, Stage.RAY_TREE, Stage.INSIDE_GEOMETRY, Stage.DIRECT_LIGHT,
     Stage.FORM_FACTORS, Stage.SOLVE, Stage.FINAL_GATHER, Stage.FINISH, Stage.WRITE,
 )  # fmt: skip
-# The stages from `texels` to `final gather`.
+# The stages of light transport, from `texels` to `final gather`.
 TRANSPORT = STAGES[2:9]
 Row = Sequence[str | float | int]
 

@@ -197,9 +197,10 @@ def _series(options: argparse.Namespace, folder: Path, cache: Path) -> list[dict
 
 
 def _large(options: argparse.Namespace, folder: Path, cache: Path) -> list[dict[str, Any]]:
-    """Measure the memory of bakes with a page of 4096 texels and, with --unwrap-large, of an unwrap.
+    """Measure the memory of two bakes with a page of 4096 x 4096 texels.
 
-    The bakes are those of the interior and of the largest scene of the triangle series.
+    The bakes are that of the interior and that of the scene with the most triangles. With `--unwrap-large`,
+    the memory of an unwrap is measured, too.
     """
     if options.no_large:
         return []

@@ -67,7 +67,7 @@ def sizes(scene: Path) -> tuple[int, int]:
 
 
 def measure_bake(scene: Path) -> None:
-    """Print the sizes and durations in docs/SCALING.md."""
+    """Print the sizes and durations that docs/SCALING.md lists."""
     payload, pixels = sizes(scene)
     print(f"{scene.name}: {payload / 1e6:.2f} MB to each worker, {pixels} pixels")
     for workers in (0, 1, 2):
@@ -81,8 +81,8 @@ def measure_bake(scene: Path) -> None:
 def measure_batch(folder: Path) -> None:
     """Print the duration of a batch of small scenes.
 
-    Measured are the whole batch with `--jobs` 1 and 2, an unchanged batch, and a batch with one changed
-    output.
+    The whole batch is measured with `--jobs` 1 and with `--jobs` 2. Then the batch runs twice more: once
+    without changes, and once after a map of one bake was deleted.
     """
     scenes = sorted(path for path in folder.rglob("*") if path.suffix in (".glb", ".obj"))
     # Choose kit pieces by file size, which excludes whole levels and meshes of two triangles.

@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 
 # Number of blobs along a side of their square grid. A blob is a cube whose faces are projected onto a sphere.
 ROWS = 3
-# Half side and height of the room, metres.
+# Half the side of the square floor, and height of the room, metres.
 HALF, HEIGHT = 5.0, 5.0
 # Number of lightmap cells along a side of the page, for 54 blob faces, 6 walls and 1 ceiling light.
 CELLS = 8
 # Empty border of a cell, as a share of its side.
 GUTTER = 0.06
-# Height of the bumps, metres, on a sphere of radius 0.9.
+# Height of the bumps on a sphere of radius 0.9 m, metres.
 BUMP = 0.08
 # Radiance of the ceiling light, cd/m2.
 EMISSION = (60.0, 55.0, 48.0)

@@ -74,7 +74,7 @@ class ToyEncoding(Encoding[ToyOptions]):
 
 ENCODINGS.register("toy")(ToyEncoding())
 '''
-# Start of a Python program that searches its first argument, a folder, for encodings, too.
+# Start of a Python program. It adds its first argument to the folders that are searched for encodings.
 START = "import sys, baker.encodings; baker.encodings.__path__.append(sys.argv.pop(1)); "
 MAIN = START + "from baker.cli.__main__ import main; main()"
 PAGE = START + "sys.path.insert(0, 'docs'); from make_settings_page import page; print(page())"

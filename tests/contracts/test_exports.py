@@ -1,4 +1,4 @@
-"""Contract of every export, and the formulas for engines that the tests cannot run."""
+"""Contract of every export. For engines that the tests cannot run, the formulas of exports are tested."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def strip(number):
 
 
 def result(folder, **settings):
-    """Return a bake of six squares on two pages, whose light is made up."""
+    """Return a bake of six squares on two pages. Its light is made up."""
     folder.mkdir(exist_ok=True)
     builder = GltfBuilder()
     for number, name in enumerate(NODES):
@@ -177,8 +177,8 @@ def test_engines_that_go_by_names_get_a_name_for_each_node(bake, name):
     names = [node["name"] for node in new["nodes"]]
     assert len(set(names)) == len(names)
     for index, node in enumerate(new["nodes"]):
-        # Only letters, digits and underscores, so importers change nothing and find no hint like -col; at
-        # most 63 bytes, the limit of Blender.
+        # Names have only letters, digits and underscores. Therefore importers change no name and find no hint
+        # such as -col. Names have at most 63 bytes, the limit of Blender.
         assert re.fullmatch(r"\w{1,63}", node["name"], re.ASCII)
         assert node["name"].endswith(f"_n{index}")
         assert node["extras"]["baker_node"] == index

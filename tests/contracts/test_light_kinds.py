@@ -179,7 +179,7 @@ def test_a_kind_added_by_one_file_is_taken_by_all(tmp_path, add_kind):
 
 
 def test_a_kind_with_a_fall_off_of_its_own_is_taken_by_all(tmp_path, add_kind):
-    """The bake evaluates the kernel of the kind, the path tracer its table. `verify` finds no difference."""
+    """The bake evaluates the kind's kernel, the path tracer the kind's table. `verify` finds them equal."""
     add_kind("beacon", BEACON)
     out = tmp_path / "out"
     light = replace(shining("beacon", 100.0), parameters={"sharpness": 3.0})
@@ -279,7 +279,7 @@ def test_an_unknown_kind_is_an_error_also_of_a_light_that_is_off(name):
     assert str(caught.value) == (
         f"light 'night': there is no kind of light 'laser'; known are {', '.join(LIGHT_KINDS.names())}"
     )
-    # The same function accepts lights of known kinds.
+    # The function accepts lights of known kinds.
     REFUSERS[name](lit_by(shining("point"), shining("spot", 0.0)))
 
 

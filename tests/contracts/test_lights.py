@@ -235,7 +235,8 @@ def test_the_fall_off_of_a_spot():
     origin = np.zeros((1, 16, 3), np.float32)
     normal = np.zeros((1, 16, 3), np.float32)
     angle = np.array([0, 0.1, 0.29, 0.31, 0.4, 0.5, 0.6, 0.7, 0.79, 0.81, 1.0, 1.5, 2.0, 3.0, 3.1, 0.3])
-    # Points on a unit sphere around the light that face it, so E is the cone's fall-off times 1 cd.
+    # The points lie on a unit sphere around the light and face the light. So E is the cone's fall-off times 1
+    # lx.
     axis, side = DIRECTION, np.cross(DIRECTION, [0, 1, 0])
     side = side / np.linalg.norm(side)
     way = np.cos(angle)[:, None] * axis + np.sin(angle)[:, None] * side

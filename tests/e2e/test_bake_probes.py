@@ -62,8 +62,8 @@ def test_ao_falls_into_corners(interior):
     middle = mean(interior, [(6.9, 0, 2.3)], UP, "ao")
     edge = mean(interior, [(6.9, 0, 3.93)], UP, "ao")
     corner = mean(interior, [(5.27, 0, 3.93)], UP, "ao")
-    # The point is 7 cm from a wall and the AO distance is 50 cm, so c = 0.14 and AO is
-    # 1 - (acos c - c sqrt(1 - c c)) / pi = 0.59.
+    # The point is 7 cm from a wall and the AO distance is 50 cm. With c = 7 / 50 = 0.14, AO is 1 - (acos c -
+    # c sqrt(1 - c c)) / pi = 0.59.
     assert middle > 0.97
     assert edge == pytest.approx(0.59, abs=0.08)
     assert corner < 0.8 * edge

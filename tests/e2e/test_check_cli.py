@@ -236,7 +236,8 @@ def test_cost_by_the_speed_of_the_latest_bake_beside_the_scene(tmp_path):
     found = cost()
     assert found["basis"] == "the bake in 'later'"
     assert found["seconds"] == pytest.approx(14 * round(0.8 * 64 * 64) * 2e-3, rel=0.01)
-    # With an earlier bake, `--cost` measures no rates. `--rates` takes precedence over a bake that is found.
+    # If an earlier bake is found, `--cost` uses its rates and measures none. `--rates` takes precedence over
+    # an earlier bake.
     assert cost("--cost")["basis"] == "the bake in 'later'"
     assert cost("--rates", tmp_path / "first")["seconds"] < found["seconds"] / 100
 

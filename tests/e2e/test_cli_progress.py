@@ -14,7 +14,7 @@ from baker.core.stage import COMPILING
 
 
 class Terminal(io.StringIO):
-    """A stream that claims to be a terminal."""
+    """A stream whose `isatty` returns True."""
 
     def isatty(self):
         return True
@@ -44,7 +44,7 @@ def test_terminal_gets_a_bar_with_stage_rate_and_time_left():
 
 
 def plan_lines(reports, expected):
-    """Return the lines that a bake prints for (seconds, stage, fraction, detail)."""
+    """Return the lines that a bake prints for `reports`, a list of (seconds, stage, fraction, detail)."""
     now, stream = [0.0], io.StringIO()
     reporter = Reporter(quiet=False, stopped=lambda: False, stream=stream, clock=lambda: now[0])
     with reporter:
@@ -71,7 +71,8 @@ def test_a_bake_has_one_progress_with_the_time_left_of_all_stages():
     assert 12 + 3 < left[2] <= 12 + 3 * 8
     assert left[4] == pytest.approx(left[3] - 3, abs=1)
     assert left[-1] == 0
-    # The bake takes 48 s. The estimate is within a factor of two from the middle on.
+    # The bake takes 48 s. From its middle on, the estimated time left is within a factor of two of the true
+    # one.
     assert all(0.5 < (48 - then) / value < 2 for then, value in ((32, left[3]), (40, left[5])))
 
 

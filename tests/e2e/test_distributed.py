@@ -166,7 +166,7 @@ def test_another_version_is_refused_and_both_are_named(machines, tmp_path):
 
 
 def test_a_worker_killed_in_the_middle_costs_its_tiles_only(machines, alone):
-    """The bake finishes without the killed worker. Must be the last test that uses `machines`."""
+    """The bake finishes. This must be the last test with `machines`, because the worker is not restarted."""
     victim = machines.workers[0]
     fractions = []
 

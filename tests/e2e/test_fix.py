@@ -1,4 +1,4 @@
-"""`baker check --fix` from the command line, and bakes before and after it."""
+"""`baker check --fix` on the command line. Bakes before and after the fix are compared."""
 
 from __future__ import annotations
 

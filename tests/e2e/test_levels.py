@@ -21,7 +21,8 @@ ASSETS = Path(__file__).parents[2] / "assets"
 FOLDER = ASSETS / "levels"
 KEPT = ("closed", "garage", "street", "tunnel", "warehouse")
 UP, DOWN, EAST, WEST, NORTH, SOUTH = (0, 1, 0), (0, -1, 0), (1, 0, 0), (-1, 0, 0), (0, 0, -1), (0, 0, 1)
-# Largest E in a dark room as a share of E outside: far from other surfaces, and within a texel of them.
+# Largest E in a dark room as a share of E outside: far from other surfaces, and within a texel of another
+# surface.
 AWAY, BESIDE = 1e-4, 1e-3
 
 

@@ -1,7 +1,7 @@
 """No output of any command replaces an input or a file of a bake.
 
-The tests find commands and options in their declarations. Each option that takes a path is an output if
-`OUTPUTS` lists it, and otherwise an input.
+The tests find all commands and options in the declarations of the command line. Each option that takes a path
+is an output if `OUTPUTS` lists it, and otherwise an input.
 """
 
 from __future__ import annotations

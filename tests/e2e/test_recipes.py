@@ -73,7 +73,8 @@ def test_the_makefile(game):
     assert "0 baked, 1 unchanged" in text
     assert "baker verify" not in text
 
-    # A changed setting causes a new bake and a verification, with limits that no bake can pass.
+    # A changed setting causes a new bake and its verification. Here the verification fails, because its
+    # limits are such that no bake passes.
     write_jobs(game, 32)
     code, text = make(game, "irradiance.median > 0.000001")
     assert code != 0
@@ -136,7 +137,7 @@ def shell(folder, lines, limits=LIMITS):
 
 
 def dockerfile():
-    """Return the instructions of the Dockerfile as (word, rest), with continued lines joined."""
+    """Return the Dockerfile as a list of (instruction, arguments), with continued lines joined."""
     lines = (RECIPES / "Dockerfile").read_text("utf-8").splitlines()
     text = re.sub(r"\\\n\s*", "", "\n".join(line for line in lines if not line.startswith("#")))
     return [tuple(line.split(maxsplit=1)) for line in text.splitlines() if line]

@@ -405,7 +405,7 @@ def test_a_tampered_bake_is_shown_as_it_is(baked, tmp_path):
     size = {"width": 16, "height": 12, "spp": 4}
     once, twice = (render(CORNELL, RenderSettings(**size, lightmap=folder)) for folder in (baked, out))
     assert [w.object for w in twice.warnings] == ["irradiance_0.exr"]
-    # The map does not change the emission of emitters, so compare the median.
+    # The lightmap does not change how bright emitters appear, so compare the median.
     lit = once.colour > 0
     assert np.median(twice.colour[lit] / once.colour[lit]) == pytest.approx(2, rel=1e-3)
 

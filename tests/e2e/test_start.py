@@ -49,8 +49,9 @@ def test_ctrl_c_during_imports(module, as_json):
 
 
 def test_few_modules_are_imported_before_ctrl_c_is_handled():
-    """Until then, Ctrl-C ends with Python's own traceback."""
-    # -S leaves out the site packages; without their import hook, the folder `cli` becomes `baker.cli` here.
+    """While these modules are imported, Ctrl-C still ends with Python's own traceback."""
+    # `-S` leaves out the site packages with their import hook, so this program itself makes the folder `cli`
+    # importable as `baker.cli`.
     code = (
         f"import sys, os; sys.path.insert(0, {str(ROOT)!r}); before = set(sys.modules)\n"
         "import baker, cli; sys.modules['baker.cli'] = cli\n"

@@ -129,8 +129,8 @@ def test_light_gained_on_the_whole_is_told(sound, tmp_path):
     assert (code, [v["failed"] for v in after["limits"]]) == (1, [True, False])
     figures = [found["channels"]["irradiance"] for found in (before, after)]
     ratio = [found["energy_ratio"] for found in figures]
-    # Texels are chosen by their order of brightness, which rounding to half floats changes, so the two sets
-    # of texels differ slightly.
+    # Texels are chosen by their rank in brightness. Rounding to half floats changes the ranks, so the two
+    # sets of texels differ slightly.
     error = np.hypot(*(found["energy_ratio_se"] for found in figures))
     assert ratio[1] / ratio[0] == pytest.approx(1.03, abs=4 * error)
     stream = StringIO()
@@ -198,7 +198,8 @@ def test_reports(sound, tmp_path):
     assert "<h1>Verification of " in text
     assert "The bake is good: irradiance is " in text
     assert "The bake is good: irradiance is " in stream.getvalue()
-    # Date, versions and settings, the explanation of each figure, and a plot of the light levels.
+    # The report contains date, versions and settings, the explanation of each figure, and a plot of the light
+    # levels.
     assert " UTC, baker " in text
     assert "--resolution 128" in text
     assert "--texels 400" in text
@@ -239,7 +240,7 @@ def test_compiling_does_not_use_up_the_time_limit(sound, monkeypatch):
     monkeypatch.setattr(tracing, "irradiance_pass", slow_at_first)
     found = verify(sound, VerifySettings(texels=40, target_se=1e-4, time_limit=1.0))
     assert len(passes) > 3
-    # The time is reported separately.
+    # The compile time is reported separately.
     assert found.compile_seconds > 1.5
 
 

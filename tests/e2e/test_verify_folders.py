@@ -40,7 +40,7 @@ def test_a_moved_folder(plain, tmp_path):
     shutil.copytree(plain, moved)
     found = verify(moved, QUICK)
     assert found.passed
-    # A furnace, so E = pi L / (1 - albedo) everywhere.
+    # All surfaces have the same emission and albedo (a furnace), so E = pi L / (1 - albedo) everywhere.
     assert found.channels["irradiance"].reference.mean() == pytest.approx(2 * np.pi, rel=0.01)
     assert abs(found.channels["irradiance"].metrics["bias"]) < 0.005
 

@@ -1,8 +1,8 @@
 """`baker verify` with its default limits detects changed maps and faulty bakes.
 
-The scene has two closed rooms side by side, one a thousand times brighter than the other. The reference is
-traced once and used for all changed maps, because it does not depend on the maps. Only the choice of
-texels would depend on the maps.
+The scene has two closed rooms side by side, one a thousand times brighter than the other. The reference, the
+path-traced light of some texels, is traced once and compared with every changed map. Its values do not depend
+on the maps; only the choice of the texels would depend on them.
 """
 
 from __future__ import annotations

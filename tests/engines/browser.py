@@ -1,4 +1,4 @@
-"""Headless Chromium with a software renderer, and a server of static files on the loopback address.
+"""Starts headless Chromium with a software renderer, and serves static files on the loopback address.
 
 Tests use both to read back what a browser draws. If a tool is missing, the test is not skipped: it fails
 with a sentence that says what to install.

@@ -1,4 +1,4 @@
-"""Draws exports in the browser and compares pixels."""
+"""Draws exports in the browser, and compares their pixels with the expected colours."""
 
 from __future__ import annotations
 

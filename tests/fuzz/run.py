@@ -21,7 +21,8 @@ from pathlib import Path
 import numpy as np
 from targets import ANSWERS, SCENES, TARGETS
 
-# Duration of a mutation, seconds. Longer ones are reported.
+# Longest permitted duration of the run with one mutation, seconds. A mutation whose run takes longer is
+# reported.
 LONGEST = 60.0
 
 

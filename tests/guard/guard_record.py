@@ -32,7 +32,7 @@ Record = dict[str, Any]
 
 @dataclass(frozen=True)
 class Program:
-    """How `baker` is started.
+    """The command and folders with which one version of `baker` is started.
 
     Attributes
     ----------
