@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 
 # Weight of the expected speed against the measured one, seconds of expected work.
 _PRIOR_SECONDS = 2.0
-# Share of a stage from which its duration is extrapolated from its own progress.
+# Smallest completed share of a stage at which its duration is extrapolated from its own progress.
 _ENOUGH = 0.1
 
 

@@ -122,7 +122,7 @@ def _properties(light: Any) -> str:
 
 
 def _value(a: Any, b: Any) -> str:
-    """Return two values with six digits, or with all digits if they differ only in the others."""
+    """Return two values with six digits, or with all digits if the first six are equal."""
     texts = _rounded(a), _rounded(b)
     if texts[0] == texts[1]:
         texts = json.dumps(a), json.dumps(b)

@@ -62,7 +62,9 @@ def write_text(found: VerifyReport, stream: TextIO, *, verbose: int) -> None:
             stream.write(f"  energy ratio {ratio:.4f}{give}\n")
         if check.unresolved:
             share = check.unresolved / max(len(check.value), 1)
-            stream.write(f"  {share:.0%} of its texels stayed noisier than asked for; see noise_floor\n")
+            stream.write(
+                f"  {share:.0%} of its texels did not reach the target standard error; see noise_floor\n"
+            )
     if verbose:
         for column in _COLUMNS:
             stream.write(f"  {column}: {FIGURES[column].phrase}\n")

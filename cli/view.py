@@ -31,7 +31,7 @@ def view(
     ] = True,
     three: Annotated[
         Path | None,
-        typer.Option("--three", metavar="PATH", help="Your own three.js: its file, or npm's folder."),
+        typer.Option("--three", metavar="PATH", help="Copy of three.js to use: its file, or its npm folder."),
     ] = None,
     export: Annotated[
         Path | None,

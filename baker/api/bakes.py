@@ -92,9 +92,9 @@ def bake(
         exclude : str | Sequence[str], default ()
             Leave out objects and lights with these node names or node paths, and their descendants.
         up : Literal["y", "z"], default 'y'
-            Up axis of files in formats that do not specify it.
+            Up axis, for file formats that do not specify one.
         scale : float, m, above 0, default 1.0
-            Metres per unit of files in formats that do not specify it.
+            Metres per unit, for file formats that do not specify their unit.
         allow_outside : bool, default False
             Also read referenced files outside the scene's folder.
         seed : int, 0 to 2147483647, default 0

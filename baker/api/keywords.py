@@ -75,10 +75,10 @@ class BakeKeywords(TypedDict, total=False):
     # Leave out objects and lights with these node names or node paths, and their descendants.
     exclude: str | Sequence[str]
 
-    # Up axis of files in formats that do not specify it.
+    # Up axis, for file formats that do not specify one.
     up: Literal["y", "z"]
 
-    # Metres per unit of files in formats that do not specify it.
+    # Metres per unit, for file formats that do not specify their unit.
     scale: float
 
     # Also read referenced files outside the scene's folder.
@@ -166,7 +166,7 @@ class CheckKeywords(TypedDict, total=False):
     # Findings to ignore; `*` matches any letters. Repeatable.
     ignore: str | Sequence[str]
 
-    # Mip level at which charts must not bleed together.
+    # Coarsest mip level at which charts must not bleed into each other; 0 is the page.
     mip: int
 
     # Folder of an earlier bake whose speed is used to estimate time; default: the latest bake of
@@ -266,10 +266,10 @@ class RepairKeywords(TypedDict, total=False):
     # Width of the page for which lightmap uv are tested and made.
     resolution: int
 
-    # Up axis of files in formats that do not specify it.
+    # Up axis, for file formats that do not specify one.
     up: Literal["y", "z"]
 
-    # Metres per unit of files in formats that do not specify it.
+    # Metres per unit, for file formats that do not specify their unit.
     scale: float
 
     # Also read referenced files outside the scene's folder.

@@ -88,7 +88,7 @@ def check(
         ignore : str | Sequence[str], default ()
             Findings to ignore; `*` matches any letters. Repeatable.
         mip : int, 0 to 14, default 2
-            Mip level at which charts must not bleed together.
+            Coarsest mip level at which charts must not bleed into each other; 0 is the page.
         rates : str | Path | None, default None
             Folder of an earlier bake whose speed is used to estimate time; default: the latest bake of the
             scene in a folder beside it.
@@ -161,9 +161,9 @@ def repair(
         resolution : int, texels, 16 to 16384, default 1024
             Width of the page for which lightmap uv are tested and made.
         up : Literal["y", "z"], default 'y'
-            Up axis of files in formats that do not specify it.
+            Up axis, for file formats that do not specify one.
         scale : float, m, above 0, default 1.0
-            Metres per unit of files in formats that do not specify it.
+            Metres per unit, for file formats that do not specify their unit.
         allow_outside : bool, default False
             Also read referenced files outside the scene's folder.
         threads : int | None, 1 to 1024, default None

@@ -1,4 +1,4 @@
-"""Speed of bakes on this machine, read from the manifest of an earlier bake.
+"""Reads the speed of bakes on this machine from the manifest of an earlier bake.
 
 The earlier bake is the one that the setting `rates` names, or else the latest bake of the scene in a folder
 beside the scene file.
@@ -21,7 +21,8 @@ from baker.io.regular_file import read_regular
 # Number of entries of the scene's folder that are searched for `bake.json`.
 # Size above which a manifest is not read, bytes.
 _MOST_FOLDERS, _MOST_BYTES = 200, 1 << 24
-# Stages grouped by the number to which their time is proportional: of texels, of triangles, or of rays.
+# Stages whose time is proportional to the number of texels, stages whose time is proportional to the number
+# of triangles, and stages whose time is proportional to their number of rays.
 BY_TEXEL = (Stage.TEXELS, Stage.FINISH, Stage.WRITE, Stage.SOLVE)
 BY_TRIANGLE = (Stage.LOAD, Stage.UNWRAP, Stage.RAY_TREE)
 RAY_STAGES = (
@@ -99,7 +100,7 @@ def rates_beside(scene: Path) -> Rates | None:
     returned if no such bake is found.
     """
     found: list[tuple[str, str, Rates]] = []
-    # A loop of links is a RuntimeError.
+    # Python raises RuntimeError for a loop of symbolic links.
     with contextlib.suppress(OSError, ValueError, RuntimeError):
         for folder in sorted(scene.resolve().parent.iterdir())[:_MOST_FOLDERS]:
             path = folder / MANIFEST_NAME

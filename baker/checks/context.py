@@ -37,7 +37,7 @@ class CheckContext:
     Attributes
     ----------
     scene : Scene
-        The scene, read for a check (leniently) or for a bake.
+        The scene, which `load_scene` read for a check (with `lenient=True`) or for a bake.
     source : SourceScene
         The meshes of the file. In a scene read for a check they include defective triangles. In a scene read
         for a bake they contain the good triangles only.
@@ -154,7 +154,7 @@ class CheckContext:
 
     @cached_property
     def mesh_with(self) -> dict[int, int]:
-        """Return the first mesh with good triangles of each material, by material index."""
+        """Return, by material index, the first mesh that has good triangles of this material."""
         found: dict[int, int] = {}
         for m, facts in enumerate(self.meshes):
             for k in np.unique(facts.material[facts.good]).tolist():

@@ -1,4 +1,4 @@
-"""Estimate of direct irradiance at a few hundred points of a scene, without a bake.
+"""Estimates direct irradiance at a few hundred points of a scene without a bake, for rules about light.
 
     E = sum I cos / r^2  +  sum L cos cos' A / r^2  +  pi L_sky
 

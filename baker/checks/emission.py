@@ -1,4 +1,4 @@
-"""Radiance that triangles emit: the exact mean of the emissive texture over a triangle or over its parts."""
+"""Finds the emissive triangles, with the mean radiance of each triangle or of each of its parts."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ class MeshFacts:
 
     @cached_property
     def within(self) -> NDArray[np.bool_]:
-        """Return (T,) bool: the faces whose three indices are those of vertices of their own primitive."""
+        """Return (T,) bool: the faces whose three indices refer to vertices of their own primitive."""
         if self.trusted:
             return np.ones(len(self.triangle), bool)
         low, high = self.vertex_start[self.primitive], self.vertex_start[self.primitive + 1]

@@ -79,7 +79,7 @@ def _result(finding: Finding, index: dict[str, int], uri: str, *, suppressed: bo
         "level": _LEVEL[finding.severity],
         "message": {"text": f"{where}{finding.message}. To do: {finding.fix}."},
         "locations": [location],
-        # The fingerprint depends on neither other findings nor counts, so it survives other changes.
+        # The fingerprint depends on neither other findings nor counts, so it stays equal if these change.
         "partialFingerprints": {"object/v1": f"{finding.code}@{finding.object}"},
         "properties": finding_json(finding),
     }

@@ -32,7 +32,12 @@ class CheckSettings(Settings):
         (), "Findings to ignore; `*` matches any letters. Repeatable.",
         metavar="CODE[@OBJECT]", repeated=True,
     )  # fmt: skip
-    mip: int = setting(DEFAULT_MIP, "Mip level at which charts must not bleed together.", ge=0, le=14)
+    mip: int = setting(
+        DEFAULT_MIP,
+        "Coarsest mip level at which charts must not bleed into each other; 0 is the page.",
+        ge=0,
+        le=14,
+    )
     rates: Path | None = setting(
         None,
         "Folder of an earlier bake whose speed is used to estimate time;"

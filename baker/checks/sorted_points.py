@@ -1,4 +1,4 @@
-"""Points sorted along one axis, to find those in a box without a test of all points."""
+"""Sorts points along one axis, so that the points in a box are found without a test of all points."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from numpy.typing import NDArray
 
 
 class SortedPoints:
-    """Points with an owner each, sorted along the axis of their largest extent.
+    """Points, each with an owner number, sorted along the axis of their largest extent.
 
-    A query reads only the points in the range of the box on that axis.
+    A query tests only the points whose coordinate on that axis is in the range of the box.
 
     Parameters
     ----------
     position : (N, 3) float64
     owner : (N,) int64
-        A number for each point, such as the object or part that it belongs to.
+        A number for each point, such as the node of its object.
     """
 
     def __init__(self, position: NDArray[np.float64], owner: NDArray[np.int64]) -> None:
@@ -27,12 +27,12 @@ class SortedPoints:
     def within(
         self, low: NDArray[np.float64], high: NDArray[np.float64], without: int
     ) -> NDArray[np.float64]:
-        """Return the points in a box that have another owner than `without`.
+        """Return the points in a box whose owner is not `without`.
 
         Parameters
         ----------
         low, high : (3,) float64
-            Corners of the box, which belong to it.
+            Lowest and highest corner of the box. Points on its border are inside.
         without : int
             Owner of the points that are left out.
 

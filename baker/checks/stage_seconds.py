@@ -1,4 +1,4 @@
-"""Expected seconds of each stage of a bake, before its scene is read, for the progress of the whole bake."""
+"""Estimates the seconds of each stage of a bake before its scene is read, for the progress of the bake."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from baker.core.parallel import thread_count
 from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
 
-# Seconds times threads for each ray, without an earlier bake: measured on interior.glb with 1024 texels a
-# side, see docs/PERFORMANCE.md.
+# Seconds times threads for each ray, used if there is no earlier bake. Measured on interior.glb with 1024
+# texels a side, see docs/PERFORMANCE.md.
 _RAY_SECONDS: Mapping[Stage, float] = {
     Stage.INSIDE_GEOMETRY: 3.2e-7,
     Stage.DIRECT_LIGHT: 1.2e-7,
@@ -21,14 +21,15 @@ _RAY_SECONDS: Mapping[Stage, float] = {
     Stage.FINAL_GATHER: 1.7e-7,
     Stage.AMBIENT_OCCLUSION: 1.7e-7,
 }
-# Seconds times threads for each texel of the stages without rays, for bakes with and without a denoiser.
+# Seconds times threads for each texel: of stages without rays, of the stage `FINISH` without the denoiser,
+# and of the denoiser.
 _TEXEL_SECONDS: Mapping[Stage, float] = {Stage.TEXELS: 1.5e-6, Stage.TEXEL_SIDES: 6e-7, Stage.WRITE: 2e-6}
 _FINISH_SECONDS, _DENOISE_SECONDS = 5e-6, 1e-5
 # Seconds of stages that depend on the scene, which is not yet known.
 _SCENE_SECONDS: Mapping[Stage, float] = {
     Stage.LOAD: 0.1, Stage.UNWRAP: 1.0, Stage.RAY_TREE: 0.05, Stage.SOLVE: 0.2
 }  # fmt: skip
-# Area for which a density is assumed to need one page, as the area of the scene is not yet known, pages.
+# Assumed area of the scene if `density` is set, in areas of a page, because the scene is not read yet.
 _ASSUMED_PAGES = 1.0
 
 
@@ -64,13 +65,13 @@ def stage_seconds(settings: BakeSettings, scene: Path) -> dict[str, float]:
 
 
 def _seconds_per_ray(stage: Stage, rates: Rates | None, threads: int) -> float:
-    """Return the time of a ray: that of an earlier bake, if it cast rays in this stage."""
+    """Return the seconds per ray of a stage: of an earlier bake that cast rays in it, else the default."""
     default = _RAY_SECONDS[stage] / threads
     return default if rates is None else rates.ray.get(stage, default)
 
 
 def _workload(settings: BakeSettings, channels: Mapping[str, Channel]) -> Workload:
-    """Return the size of a bake of a scene of which nothing is known."""
+    """Return the estimated size of a bake whose scene is not read yet."""
     area = 0.0 if settings.density is None else _ASSUMED_PAGES * (settings.resolution / settings.density) ** 2
     texels, pages = texels_and_pages(settings, area)
     return Workload(

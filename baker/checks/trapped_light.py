@@ -1,4 +1,4 @@
-"""Gain of light by reflections between nearly white surfaces, estimated with random paths.
+"""Estimates the gain of light by reflections between nearly white surfaces, with random paths.
 
 Let s_n be the share of the light that is left after n reflections. Each reflection then keeps a share of
 about s_n^(1/n). All reflections together then multiply light by the sum of the geometric series,
@@ -64,7 +64,7 @@ def trapped_gain(context: CheckContext, albedo: NDArray[np.float64]) -> float:
             alive[:, None], origin + direction * np.where(alive, distance, 0.0)[:, None], position
         )
     mean = left.reshape(POINTS, PATHS).mean(axis=1)
-    # Average only over points where light is trapped, because open parts of the scene would hide a white
-    # room.
+    # Average only over points where light is trapped: low gains in open parts of the scene would hide the
+    # high gain in a closed white room.
     trapped = mean > (1.0 - 1.0 / MOST_GAIN) ** REFLECTIONS
     return 1.0 / (1.0 - float(mean[trapped].mean()) ** (1.0 / REFLECTIONS)) if trapped.any() else 1.0

@@ -12,9 +12,10 @@ from baker.io.bake.read_bake import StoredBake
 
 
 def manifest_differences(a: StoredBake, b: StoredBake, pairs: ObjectPairs) -> list[dict[str, Any]]:
-    """Return the differing entries of two manifests, as dictionaries with the keys `what`, `a` and `b`.
+    """Return the entries in which two manifests differ, as dictionaries with the keys `what`, `a` and `b`.
 
-    The settings, input, versions, lights, pages and channels are compared, and the matrices of paired
+    `what` is the name of the entry; `a` and `b` are its values in the two bakes. The function compares
+    settings, input, versions, lights, pages and channels. It also compares the world matrices of each pair of
     objects.
 
     Parameters

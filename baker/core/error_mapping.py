@@ -43,7 +43,7 @@ def explain(error: BaseException) -> BakerError | None:
     if isinstance(error, MemoryError):
         return ResourceError(_OUT_OF_MEMORY)
     if isinstance(error, RuntimeError) and str(error).startswith("Symlink loop"):
-        # Path.resolve of Python 3.11 and 3.12 raises this error.
+        # In Python 3.11 and 3.12, Path.resolve raises this RuntimeError for a loop of links.
         return InputError("the links in this path form a loop", file=str(error).partition("'")[2].rstrip("'"))
     if isinstance(error, OSError):
         reason = _RESOURCE_ERRNO.get(error.errno or 0, error.strerror or str(error))

@@ -25,7 +25,7 @@ class BakerError(Exception):
     exit_code = 1
 
     def __init__(self, message: str, *, file: str | None = None, object: str | None = None) -> None:
-        # Convert all three texts to one line, because they may contain names from a file.
+        # Replace line breaks and control characters in each text, because names from a file may contain them.
         message = message_line(message)
         super().__init__(message)
         self.message = message

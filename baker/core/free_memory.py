@@ -51,8 +51,8 @@ def _left_in_groups(proc: Path, cgroups: Path) -> Iterator[int]:
             names = ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
         else:
             continue
-        # Limits of all groups from this process's to the root apply. In a container, the root of the mount
-        # is the group of the container, and the path of the group may not exist.
+        # The limits of this process's group and of all its parent groups apply. In a container, the root of
+        # the mount is the group of the container, and the path of the group may not exist.
         path = folder / group.lstrip("/")
         for parent in (path, *path.parents):
             yield from _left(parent, *names)

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 
 # Number of lost bits of an object that are ignored.
 _UNCOUNTED_BITS = 3.0
-# Number of bits per object, as a weighted mean, that an origin other than 0 must save.
+# Smallest weighted mean of the bits per object that an origin other than 0 must save.
 _MIN_GAIN = 2.0
-# Number of candidate origins, which are centres of objects: half of them of the objects with most triangles,
-# the others of objects evenly spaced in the list of objects.
+# Number of candidate origins. Each candidate is the centre of an object. Half of these objects are those with
+# most triangles; the others are evenly spaced in the list of objects.
 _CANDIDATES = 64
-# Largest number of vertices read from each mesh.
+# Approximate number of vertices that are read from a mesh with more vertices.
 _VERTICES = 1 << 15
 
 

@@ -1,7 +1,7 @@
 """The scene that is baked: immutable arrays in metres, +Y up, linear Rec.709.
 
-Importers create it. Meshes are in object space and shared by instances; `baker.core.geometry` transforms them
-to world space.
+Importers create the `Scene`. Meshes are in object space and shared by instances; `baker.core.geometry`
+transforms them to world space.
 """
 
 from __future__ import annotations

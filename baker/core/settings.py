@@ -104,10 +104,10 @@ class CommonSettings(Settings):
         repeated=True,
         group=SCENE,
     )
-    up: Literal["y", "z"] = setting("y", "Up axis of files in formats that do not specify it.", group=SCENE)
+    up: Literal["y", "z"] = setting("y", "Up axis, for file formats that do not specify one.", group=SCENE)
     scale: float = setting(
         1.0,
-        "Metres per unit of files in formats that do not specify it.",
+        "Metres per unit, for file formats that do not specify their unit.",
         unit="m",
         gt=0,
         allow_inf_nan=False,

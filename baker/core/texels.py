@@ -24,7 +24,7 @@ class TexelBuffer:
     resolution, n_pages, n_front : int
         Side of a page in texels, number of pages, number of front entries.
     pixel : (n,) int64
-        (page * resolution + row) * resolution + column; a back entry has the pixel of its front.
+        (page * resolution + row) * resolution + column; a back entry has the pixel of its front entry.
     back : (n,) bool
         Whether the entry is a back side.
     first : (n_front + 1,) int64
@@ -44,8 +44,8 @@ class TexelBuffer:
         Unit shading normal, world; reversed on back entries.
     albedo : (n, 3) float32, linear Rec.709
     lookup : (P * H * W,) int32
-        Front entry of each pixel. Rounding may move a hit on a chart's border to a pixel just outside the
-        chart, so these pixels have the entry of a covered neighbour. All other pixels have -1.
+        Front entry of each pixel. Pixels just outside a chart have the entry of a covered neighbour, because
+        rounding may move a hit on the chart's border to such a pixel. All other pixels have -1.
     back_entry : (n_front,) int32
         Entry of the back side of each front texel, or -1.
     region : (n_front,) int32

@@ -1,4 +1,4 @@
-"""Export for Babylon.js: scene.glb, the EXR pages, and a module that loads both."""
+"""Writes files for Babylon.js: scene.glb, the EXR pages, and a module that loads both."""
 
 from __future__ import annotations
 
@@ -25,13 +25,14 @@ class BabylonExport:
                 "Serve this folder, and load it with lightmap.js (Babylon.js 7 or newer, glTF loader):",
                 "`import { loadBake } from './babylon/lightmap.js';`",
                 "`await loadBake(BABYLON, 'babylon/', scene);`",
-                "The lights of the file are switched off, because the pages contain their light.",
+                "lightmap.js switches the lights of scene.glb off, because the pages contain their light.",
                 "For ZIP pages, Babylon.js fetches fflate from a CDN; `{ fflate: URL }` names your copy.",
             ),
             scale="The pages contain irradiance E in lx; materials show albedo x E / pi in cd/m2. "
             "The option `{ exposure: x }` multiplies all light by x.",
             uv="TEXCOORD_1, which is `coordinatesIndex = 1`.",
-            rows="v = 0 is the first row of the EXR. Babylon.js stores the rows bottom-up, so 1 - v is used.",
+            rows="v = 0 is the first row of the EXR. Babylon.js stores the rows bottom-up, so lightmap.js "
+            "replaces v by 1 - v.",
         )
 
 

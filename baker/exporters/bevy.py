@@ -1,4 +1,4 @@
-"""Export for Bevy: pages, scene, and a plugin in one file that adds `Lightmap` components to the objects.
+"""Writes for Bevy: pages, scene, and a plugin in one file that adds `Lightmap` components to the objects.
 
 Bevy shows `lightmap * lightmap_exposure * diffuse colour * view exposure`. The lightmap is E, so
 `lightmap_exposure = 1 / pi` gives the radiance albedo * E / pi in cd/m2.

@@ -1,4 +1,4 @@
-"""Export for Blender: scene.glb, the EXR pages, and a script that imports both and sets up materials."""
+"""Writes for Blender: scene.glb, the EXR pages, and a script that imports both and sets up materials."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Export as plain glTF: scene.glb with lightmap uv, and baked AO as its occlusion texture."""
+"""Writes a plain glTF file: scene.glb with lightmap uv, and baked AO as its occlusion texture."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class GltfExport:
                 "Load scene.glb into any program that reads glTF 2.0. Baked AO is its occlusion texture.",
                 "glTF has no lightmaps: to use the irradiance, choose the export of your engine, or `unlit`.",
             ),
-            scale="AO is the unoccluded share of the hemisphere, 255 = all; it dims indirect light only.",
+            scale="AO is the unoccluded share of the hemisphere, 255 is 1; it dims indirect light only.",
             uv="TEXCOORD_1 is the lightmap uv; the occlusion texture reads it (`texCoord` 1).",
             rows="v = 0 is the first row of the image, as everywhere in glTF.",
         )

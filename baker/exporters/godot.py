@@ -1,4 +1,4 @@
-"""Export for Godot 4 and 3: pages, scene, a shader, and a script that assigns the shader to the objects."""
+"""Writes for Godot 4 and 3: pages, scene, a shader, and a script that assigns the shader to objects."""
 
 from __future__ import annotations
 

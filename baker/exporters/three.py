@@ -1,4 +1,4 @@
-"""Export for three.js: scene.glb, the EXR pages, and a module that loads both."""
+"""Writes files for three.js: scene.glb, the EXR pages, and a module that loads both."""
 
 from __future__ import annotations
 
@@ -24,13 +24,15 @@ class ThreeExport:
             steps=(
                 "Serve this folder and load it with lightmap.js (three.js r151 or newer):",
                 "`const { gltf } = await loadBake('three/'); scene.add(gltf.scene);`",
-                "The file's lights and AO maps are switched off, because the pages contain their effect.",
-                "Materials become MeshLambertMaterial; `{ matte: false }` keeps them, 1.5 % darker.",
+                "lightmap.js hides the lights of scene.glb and removes its AO maps, because the pages",
+                "contain their effect. Materials become MeshLambertMaterial, which shows albedo x E / pi.",
+                "`{ matte: false }` keeps the materials, which show about 1.5 % less than albedo x E / pi.",
             ),
             scale="The pages contain irradiance E in lx; used as `lightMap`, they give albedo x E / pi "
             "in cd/m2. The option `{ exposure: x }` multiplies all light by x.",
             uv="TEXCOORD_1, which is `uv1`; a texture needs `channel = 1`.",
-            rows="v = 0 is the first row of the EXR. EXRLoader stores the rows bottom-up, so 1 - v is used.",
+            rows="v = 0 is the first row of the EXR. EXRLoader stores the rows bottom-up, so lightmap.js "
+            "replaces v by 1 - v.",
         )
 
 

@@ -1,4 +1,4 @@
-"""Export for Unity: pages that hold E / pi, and scripts that import them and assign them to renderers.
+"""Writes files for Unity: pages that hold E / pi, and scripts that import them and assign them to renderers.
 
 Unity multiplies a lightmap by the albedo and not by 1 / pi, so the pages are divided by pi. Unity's glTF
 importers replace v by 1 - v, and Unity stores image rows bottom-up, so pages need no flip. The scale (su, sv)
@@ -55,12 +55,13 @@ class UnityExport:
             steps=(
                 "Copy the folder into Assets. To import scene.glb, install glTFast or UnityGLTF.",
                 "Put scene.glb into the open scene, select it, and choose Baker > Apply lightmaps.",
-                "The component BakerLightmaps stores the pages in the scene. Delete the baked lights.",
+                "The component BakerLightmaps stores the pages in the scene. Delete lights of scene.glb.",
                 "Do not use occlusion maps, because the pages already contain occlusion.",
             ),
             scale="Pages contain E / pi, the radiance of a white surface, cd/m2; Unity multiplies by albedo.",
             uv="TEXCOORD_1, which is Unity's `uv2` (Mesh.uv2).",
-            rows="v = 0 is the first row. Importers flip v and Unity stores images bottom-up, so both agree.",
+            rows="v = 0 is the first row. glTF importers replace v by 1 - v, and Unity stores images "
+            "bottom-up, so no flip is needed.",
         )
 
 

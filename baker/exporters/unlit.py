@@ -1,8 +1,8 @@
-"""Export as one GLB without lightmaps: the radiance of each surface is an unlit texture on TEXCOORD_0.
+"""Writes one GLB without lightmaps: the radiance of each surface is an unlit texture on TEXCOORD_0.
 
-It is for viewers on phones and in AR, which support neither a second uv set nor high dynamic range. Each page
-becomes an sRGB PNG of `(albedo x E / pi + emission) x exposure`, clipped at 1. The exposure is chosen so that
-99 % of the covered texels are not clipped.
+The GLB is for viewers on phones and in AR, which support neither a second uv set nor high dynamic range. Each
+page becomes an sRGB PNG of `(albedo x E / pi + emission) x exposure`, clipped at 1. The exposure is chosen so
+that 99 % of the covered texels are not clipped.
 
 Based on: Khronos Group, KHR_materials_unlit.
 """
@@ -56,7 +56,7 @@ class UnlitExport:
             steps=(
                 "scene.glb needs no other file: light and colour are one texture (KHR_materials_unlit).",
                 "All nodes are roots with world matrices; there are no animations, skins and lights.",
-                "Viewers that do not support the extension light the scene a second time.",
+                "Viewers that do not support KHR_materials_unlit add their own light to the baked light.",
             ),
             scale=f"sRGB of (albedo x E / pi + emission) x {exposure:.6g}; 1 % of texels may be clipped.",
             uv="TEXCOORD_0 is the lightmap uv, the only uv set.",

@@ -1,4 +1,4 @@
-"""Export for Unreal Engine: pages, scene, and an editor script that builds a material function.
+"""Writes files for Unreal Engine: pages, scene, and an editor script that builds a material function.
 
 Unreal cannot import lightmaps, so the reflected light becomes the emission of an unlit material:
 

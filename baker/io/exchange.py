@@ -15,7 +15,7 @@ from typing import Any
 _AT_FDCWD = -100
 _RENAME_EXCHANGE = 2
 _RENAME_SWAP = 2
-# Error codes if the operating system, the file system or one of the folders does not allow the exchange.
+# Error codes of exchanges that the operating system, the file system or one of the folders does not allow.
 _REFUSED = {
     errno.ENOSYS,
     errno.EINVAL,

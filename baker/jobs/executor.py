@@ -63,7 +63,7 @@ class JobExecutor(Protocol):
 
 @dataclass(frozen=True)
 class _Work:
-    """A job and the arguments that it was started with; `again` if a worker has died at it before."""
+    """A job and the arguments that it was started with; `again` if a worker died while it baked the job."""
 
     ticket: int
     job: Job

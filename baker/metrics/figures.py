@@ -40,9 +40,9 @@ _GROUPS = {
     "edge": "the worst group of points at edges",
 }
 _GROUP_FIGURES = {
-    "bias": Figure("mean error of {}, beyond chance", SIGNED),
-    "colour": Figure("colour shift of {}, beyond chance", SIGNED),
-    "noise": Figure("scatter of the errors in {}, beyond chance", SHARE),
+    "bias": Figure("mean error of {}, without the part that noise can explain", SIGNED),
+    "colour": Figure("colour shift of {}, without the part that noise can explain", SIGNED),
+    "noise": Figure("scatter of the errors in {}, without the part that noise can explain", SHARE),
 }
 _WHOLE = {
     "texels": Figure("number of compared texels", COUNT),
@@ -56,7 +56,9 @@ _WHOLE = {
     "max": Figure("largest relative error of a texel", SHARE),
     "noise_floor": Figure("the median that the noise of path tracing alone would give", SHARE),
     "noise_p95": Figure("the p95 that the noise of path tracing alone would give", SHARE),
-    "z_rms": Figure("errors in standard errors of path tracing; about 1 is a bake without error", NUMBER),
+    "z_rms": Figure(
+        "root mean square of error / standard error of path tracing; about 1 for a bake without error", NUMBER
+    ),
     "energy_ratio": Figure("all light of the map divided by all light of path tracing", NUMBER),
     "energy_ratio_se": Figure("standard error of energy_ratio", NUMBER),
     "colour_bias": Figure("bias of the colour with the largest error", SIGNED),
@@ -72,35 +74,49 @@ _EDGES = {
     "edge_p95": Figure("95 of 100 lookups at edges have a smaller error", SHARE),
     "edge_noise_floor": Figure("the edge_median that the noise of path tracing alone would give", SHARE),
     "edge_excess": Figure("part of edge_median that is not noise of path tracing", SHARE),
-    "edge_wrong_share": Figure("lookups at edges that give over twice or under half the light", SHARE),
+    "edge_wrong_share": Figure(
+        "share of lookups at edges that give over twice or under half the path-traced light", SHARE
+    ),
 }
 _FAULTS = {
     "suspects": Figure("texels that differ strongly from all their neighbours", COUNT),
-    "wrong_suspects": Figure("texels that differ from their neighbours and are wrong", COUNT),
+    "wrong_suspects": Figure(
+        "texels that differ strongly from all their neighbours and from path tracing", COUNT
+    ),
     "shifted": Figure("whether the page is shifted by a texel", YES_NO),
     "shifted_charts": Figure("number of charts that are shifted by a texel", COUNT),
     "shift": Figure("rows and columns by which the page is shifted", NUMBER),
-    "exponent": Figure("power law between path tracing and map; 1 is right", NUMBER),
-    "exponent_error": Figure("exponent of a curve such as gamma, minus 1", NUMBER),
+    "exponent": Figure("exponent p of the best fit map = c (path tracing)^p; 1 is right", NUMBER),
+    "exponent_error": Figure(
+        "exponent minus 1; far from 0 if the map was encoded with a curve such as gamma", NUMBER
+    ),
     "blurred": Figure("whether the page was blurred", YES_NO),
     "few_levels": Figure("whether the values were rounded to few levels", YES_NO),
-    "cut_off": Figure("share by which the light exceeds the largest value of the map", SHARE),
-    "misfilled_share": Figure("texels of the padding that do not continue their chart", SHARE),
+    "cut_off": Figure(
+        "share by which path tracing exceeds the map at texels with the map's largest value", SHARE
+    ),
+    "misfilled_share": Figure(
+        "share of padding texels that do not continue the values of their chart", SHARE
+    ),
 }
 _UNVERIFIED = {
     "area": Figure("surface of the scene", AREA),
-    "invalid_area": Figure("surface of invalid texels, filled from their neighbours", AREA),
-    "invalid_share": Figure("surface of invalid texels, filled from their neighbours", SHARE),
-    "visible_invalid_share": Figure("surface of invalid texels that can be seen", SHARE),
-    "uncovered_area": Figure("surface on texels without a measured value", AREA),
-    "uncovered_share": Figure("surface on texels without a measured value", SHARE),
+    "invalid_area": Figure("surface on invalid texels, which the bake filled from their neighbours", AREA),
+    "invalid_share": Figure("surface on invalid texels, which the bake filled from their neighbours", SHARE),
+    "visible_invalid_share": Figure(
+        "surface on invalid texels that is visible from points in the air", SHARE
+    ),
+    "uncovered_area": Figure("surface on all other texels without a measured value", AREA),
+    "uncovered_share": Figure("surface on all other texels without a measured value", SHARE),
     "unresolved_area": Figure("surface where path tracing stayed too noisy", AREA),
     "unresolved_share": Figure("surface where path tracing stayed too noisy", SHARE),
     "gap_area": Figure("surface in gaps narrower than two texels", AREA),
     "gap_share": Figure("surface in gaps narrower than two texels", SHARE),
-    "tilted_area": Figure("surface whose shading normal differs from the face", AREA),
-    "tilted_share": Figure("surface whose shading normal differs from the face", SHARE),
-    "unresolved": Figure("number of texels noisier than `target_se` asks for", COUNT),
+    "tilted_area": Figure("surface whose shading normal differs from its face normal", AREA),
+    "tilted_share": Figure("surface whose shading normal differs from its face normal", SHARE),
+    "unresolved": Figure(
+        "number of texels whose path-traced value did not reach the target standard error", COUNT
+    ),
     "flip": Figure("visible difference (FLIP): 0 none, 1 largest", NUMBER),
 }
 

@@ -1,4 +1,4 @@
-"""The exposure that `bake.json` and the exports suggest for showing a bake on a display."""
+"""Computes the exposure that `bake.json` and the exports suggest for showing a bake on a display."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ def estimate_peak_of(
     Returns
     -------
     int
-        The estimate of `check` with `cost`.
+        The same estimate as in the finding `cost` of `baker check --cost`.
     """
     chosen = (chosen_channels(settings.channels) if channels is None else channels).values()
     area = surface_area(scene) if settings.density is not None else 0.0
@@ -67,7 +67,7 @@ def check_memory(scene: Scene, settings: BakeSettings, channels: Mapping[str, Ch
         If the bake will not fit. The message has the estimate, the free memory, and the setting to lower.
     """
     need, free = estimate_peak_of(scene, settings, channels), free_memory()
-    # Memory of this process is part of the estimate: libraries and the scene.
+    # Add the memory that this process uses already, because the estimate includes libraries and the scene.
     usable = free + used_memory()
     if need <= usable:
         return

@@ -10,16 +10,17 @@ from baker.core.scene import Scene, SceneWarning
 from baker.core.settings import BakeSettings
 from baker.io.bake.write_bake import check_encodings
 
-# The warning `no-light`: its begin, by whether maps of light are baked, and the ways to light a scene.
+# Texts of the warning `no-light`: its beginning if maps of light are baked, its beginning if they are left
+# out, and its end.
 _BLACK = "nothing emits light, so the maps of light are black"
 _LEFT_OUT = "nothing emits light, so only {} is baked"
 _WAYS = "to light the scene, make a material emissive, add lights to the file, or set `sky`"
 
 
 def fit_to_light(scene: Scene, settings: BakeSettings) -> tuple[BakeSettings, SceneWarning | None]:
-    """Leave out the channels of light that a dark scene would have by default.
+    """Leave out the default channels that need light if nothing in the scene emits light.
 
-    Channels that the user has chosen are kept, as are those that an export or an encoding needs.
+    All channels are kept if the user has chosen them, or if an export or an encoding needs one of them.
 
     Parameters
     ----------

@@ -75,8 +75,8 @@ def restart_for_materials(process: Process, scene: Scene) -> Process:
 def labelled(process: Process, progress: Progress) -> Progress:
     """Return a callback that adds to reports that kernels are compiled, as long as the process runs.
 
-    The bake compiles its own kernels during the same time, at their first calls. Then a stage that takes a
-    fraction of a second otherwise stands still for many seconds at its beginning.
+    Meanwhile, the bake compiles other kernels at their first calls. A stage that usually takes a fraction of
+    a second may therefore report no progress for many seconds.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Finds the faces to flip of closed parts that `baker check` reports as inside out."""
+"""Finds the faces that the fix of `inside-out` flips: those that `baker check` reports with that code."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from baker.core.settings import make_settings
 
 
 def faces_to_flip(scene: Scene) -> dict[int, list[NDArray[np.bool_]]]:
-    """Return the faces of closed parts that are inside out.
+    """Return the faces of the closed parts of meshes that the rule `inside-out` reports.
 
     Parameters
     ----------

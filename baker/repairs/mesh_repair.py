@@ -35,7 +35,7 @@ class MeshRepair:
 
 
 def repair_mesh(primitives: list[EditablePrimitive], textured: bool, shown: SourceInstance) -> MeshRepair:
-    """Repair one mesh. If the repair would move its surface too far, see `FURTHEST`, the mesh is unchanged.
+    """Repair one mesh, unless this moves its surface by more than `shape_repair.FURTHEST` allows.
 
     Parameters
     ----------

@@ -27,7 +27,8 @@ class EditablePrimitive:
     double_sided : bool
         Whether all materials of the primitive, including those of variants, are double-sided.
     blends : bool
-        Whether a material has the alpha mode BLEND. Two equal faces then cover more than one face.
+        Whether a material has the alpha mode BLEND. Two coincident faces then hide more of the background
+        than one face.
     reads_lightmap_uv : bool
         Whether a texture of a material uses TEXCOORD_1.
     locked : str

@@ -1,4 +1,4 @@
-"""Reads a fixed scene back before it is written."""
+"""Checks that a bake could read a fixed scene, before the scene is written."""
 
 from __future__ import annotations
 
@@ -46,10 +46,10 @@ def check_readable(out: Path, data: bytes, scene: Path, *, allow_outside: bool) 
 
 
 def _check_ranges(out: Path, data: bytes, scene: Path, *, allow_outside: bool) -> None:
-    """Raise `InputError` for the first view or accessor that has become unreadable; used or not."""
+    """Raise `InputError` for the first buffer view or accessor that fixing has made unreadable."""
     faults = range_faults(open_document(out, data, SceneFolder(out.parent, allow_outside)))
     if faults and scene.suffix.lower() in (".glb", ".gltf"):
-        # What a bake does not read is not fixed. It keeps its index.
+        # Ignore views and accessors that were unreadable before the fix. Fixing keeps their indices.
         folder = SceneFolder(scene.parent, allow_outside)
         before = range_faults(open_document(scene, read_scene_file(scene), folder))
         faults = {where: fault for where, fault in faults.items() if where not in before}

@@ -26,7 +26,7 @@ HOLE_SIZE = 0.05
 FURTHEST = 0.01
 # Largest area that may be removed, as a share of the mesh's area.
 LARGEST_LOSS = 0.01
-# Cosine of the angle between the normal of a patch face and a vertex normal at the border of the hole. If the
+# Limit of the cosine between the normal of a patch face and a vertex normal at the border of the hole. If the
 # cosine is smaller, this corner of the face gets the face normal instead of the vertex normal.
 _SAME_SIDE = 0.7
 # Share of faces without any neighbour above which a mesh counts as a triangle soup.

@@ -1,7 +1,7 @@
 """Chooses the points at which a bake is compared.
 
-These are random texels, outliers, texels with the largest gradients of light, points at edges, and additional
-texels of light levels with few random texels.
+These are random texels, outliers (texels that differ from all their neighbours), texels with the largest
+gradients of light, points at edges, and additional texels of light levels with few random texels.
 """
 
 from __future__ import annotations

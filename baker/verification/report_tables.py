@@ -61,9 +61,11 @@ def regions_table(found: VerifyReport) -> str:
         )
     titles = ("region", "texels", "m2", "light", "bias", "colour", "typical (noise)")
     note = (
-        "<p>Deviations of a region are relative to its own light. A region is a room, as seen from one point,"
-        " or its texels of a light level. Worst first; what may be chance counts as nothing. typical is the"
-        " median error of a texel, and in brackets the part of it that is noise of path tracing.</p>"
+        "<p>Deviations of a region are relative to the light of that region. A region is a room, which is the"
+        " surface that is visible from one point, or all texels of a room with a similar light level. The"
+        " worst region is first; the part of a deviation that noise can explain does not count. typical is"
+        " the median error of a texel; the number in brackets is the part of it that is noise of path"
+        " tracing.</p>"
     )
     return f"<h2>Regions</h2>{note}{_table(titles, rows, wide=True)}"
 

@@ -1,4 +1,4 @@
-"""The table of the addresses of the viewer page and their content, for the server and for exported pages.
+"""Builds the table of the viewer page's addresses and contents, for the server and for exported pages.
 
 The table is filled before the page is shown, so no other file can be read through it.
 """

@@ -85,7 +85,7 @@ def checked_folder(folder: Path) -> Path:
     Raises
     ------
     SettingsError
-        If it is a file, holds files of others, or cannot be renamed.
+        If it is a file, contains a file that is not of an exported page, or cannot be renamed.
     ResourceError
         If it cannot be read.
     """

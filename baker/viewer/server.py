@@ -22,7 +22,7 @@ from baker.viewer.script import ThreeScript
 from baker.viewer.strict_http import fault_of_request
 
 HOST = "127.0.0.1"
-# A meta tag, as in an exported page, cannot forbid frames.
+# Policy of the server. Exported pages lack `frame-ancestors`, because browsers ignore it in a meta tag.
 _POLICY = f"{POLICY}; frame-ancestors 'none'"
 
 

@@ -79,7 +79,8 @@ def texel_pieces(uv, triangle, page, size, wanted, at, piece, corners, polygon, 
     page : (T,) int32, page of each triangle
     size : int, width and height of a page in texels
     wanted : (N,) int32, number i of each texel among the selected texels, -1 if it is not selected
-    at : (n,) int64 in and output, index at which the next piece of texel i is stored
+    at : (n,) int64 in and output. In: index at which the first piece of texel i is stored. Out: that
+        index plus the number of pieces of texel i.
     piece, corners : (m,) int64 output, triangle of each piece, and number of corners of its polygon
     polygon : (m, MAX_CORNERS, 2) float64 output, corners of each piece, relative to the texel's square
     write : (0 or 1,) int64, empty to count the pieces only
@@ -124,7 +125,8 @@ def spread_pieces(
     found : (n, k) int64 output, triangle of each point
     weight : (n, k, 3) float64 output, barycentric coordinates of each point
     covered : (n,) float64 output, total area of each texel's pieces, in texels
-    middle : (n, 2) float64 in and output, the mean of each texel's points is added, 0 to 1 (column, row)
+    middle : (n, 2) float64 in and output. The kernel adds the mean position of each texel's points, as
+        (column, row) inside the texel's square, 0 to 1.
     """
     for i in range(len(pixel)):
         # Sum the area of the texel's pieces.
