@@ -1,4 +1,4 @@
-"""Writes meshes, materials, nodes and lights to a GLB. The output is deterministic.
+"""Writes meshes, materials, nodes and lights to a GLB file. The same scene always gives the same bytes.
 
 This module is independent of the importer, because its files are used to test the importer.
 """

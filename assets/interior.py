@@ -9,7 +9,8 @@ from glb import GlbBuilder
 from numpy.typing import NDArray
 from shapes import Surface, ball, box, join, lathe, rooms, rounded_box, torus
 
-# Gap between objects that touch, metres, because the light of coincident surfaces is undefined.
+# Gap between objects that would touch, metres. It is needed because the light of coincident surfaces is
+# undefined.
 REST = 0.002
 HEIGHT = 2.6
 

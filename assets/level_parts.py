@@ -1,4 +1,4 @@
-"""The parts from which levels are built: slabs, sheets, walls with openings, terrain, rocks, textures."""
+"""Makes the parts of game levels: slabs, sheets, walls with openings, terrain, rocks, textures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Indoor levels: closed rooms, corridors, a garage, halls, stairs, a kitchen, a cellar."""
+"""Makes the indoor levels: closed rooms, corridors, a garage, halls, stairs, a kitchen, a cellar."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Outdoor levels: a street, terrain, rocks, trees, a greenhouse, a cave and others."""
+"""Makes the outdoor levels: a street, terrain, rocks, trees, a greenhouse, a cave and others."""
 
 from __future__ import annotations
 

@@ -142,7 +142,7 @@ def lathe(profile: list[tuple[float, float]], segments: int) -> Surface:
     """
     point = np.array(profile, float)
     step = np.diff(point, axis=0)
-    # Compute the outward normals of the segments. That of a segment that runs upwards points away from the
+    # Compute the outward normals of the segments. If a segment runs upwards, its normal points away from the
     # axis.
     side = np.stack([step[:, 1], -step[:, 0]], axis=1)
     side /= np.linalg.norm(side, axis=1, keepdims=True)
@@ -158,7 +158,7 @@ def lathe(profile: list[tuple[float, float]], segments: int) -> Surface:
         pair = np.array([start / np.linalg.norm(start), end / np.linalg.norm(end)])
         position = _spin(point[k : k + 2], turn)
         sheet = _sheet(position, _spin(pair, turn), flip=False)
-        # Drop triangles without area. At the axis, one of the two triangles of every quad has none.
+        # Drop triangles without area. At the axis, one of the two triangles of every quad has no area.
         corner = sheet.position[sheet.triangle]
         area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
         parts.append(Surface(sheet.position, sheet.normal, sheet.triangle[area > 1e-12]))

@@ -1,4 +1,4 @@
-"""Compiles functions that only kernels call, for tests."""
+"""Compiles `inner` functions for tests, because otherwise only kernels can call them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Finds the compiled kernels in a parsed file."""
+"""Finds the kernels in the syntax tree of a file, for tests of the source."""
 
 from __future__ import annotations
 

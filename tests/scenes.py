@@ -1,4 +1,4 @@
-"""Builds scenes for closed forms: quads and triangles whose lightmap uv follow texel borders."""
+"""Builds scenes that have closed forms: quads and triangles whose lightmap uv follow texel borders."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rules of the source: layers, file sizes, one file for each heavy library, types, format, no local paths."""
+"""The source keeps its rules: layers, file sizes, one importer per heavy library, types, no local paths."""
 
 from __future__ import annotations
 
@@ -220,11 +220,13 @@ def stage_literals(tree):
             found += [node.value, *getattr(node.value, "elts", [])]
         elif isinstance(node, ast.List | ast.Tuple | ast.Set | ast.Dict):
             parts = node.keys if isinstance(node, ast.Dict) else node.elts
-            # A list with several names of stages. A single name may be another kind of key.
+            # Yield names in a list only if all its items name stages. A single name may be another kind of
+            # key.
             if len(parts) > 1 and all(part is not None and text(part) in stages for part in parts):
                 found += parts
         elif text(node) in stages and " " in node.value and node.value != Stage.AMBIENT_OCCLUSION:
-            # These names are used only for stages; "ambient occlusion" is also a quantity.
+            # Yield these names anywhere, because they name only stages. "ambient occlusion" is also a
+            # quantity.
             found.append(node)
         yield from (part for part in found if part is not None and text(part) in stages)
 

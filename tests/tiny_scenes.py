@@ -69,12 +69,12 @@ class World:
 
 
 def seen_patches(texels, patch):
-    """Return the patch lookup for hits, in a scene without split texels (see `baker.radiosity.sides`)."""
+    """Return the lookup from hits to patches, if no texel is split (see `baker.radiosity.sides`)."""
     return SeenPatch(texels.hit_image(patch, -1), np.zeros(0, np.int32), no_sides())
 
 
 def seen_light(texels, exitance):
-    """Return the lookup of reflected light for hits, in a scene without split texels."""
+    """Return the lookup from hits to reflected light, if no texel is split."""
     light = exitance * np.float32([1, 1, 1, 0])
     return SeenLight(texels.hit_image(light), np.zeros((0, 4), np.float32), no_sides())
 

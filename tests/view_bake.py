@@ -2,7 +2,7 @@
 
 A camera at z = 5 looks at the plane z = 0; the picture is 4 m high there. On the left is a square with a base
 colour texture, on page 0. On the right is a square without texture, on page 1 with transposed uv. In front of
-it is a leaf whose left half is a hole.
+the right square is a leaf whose left half is a hole.
 """
 
 from __future__ import annotations

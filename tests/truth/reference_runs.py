@@ -1,4 +1,4 @@
-"""Runs the reference on scenes with closed forms, and compares its results and standard errors.
+"""Runs the reference path tracer on scenes with closed forms, and compares its results and standard errors.
 
 Each point is traced as many copies with independent random numbers. The standard deviation over the copies
 must match the standard errors that the reference reports.
@@ -20,9 +20,9 @@ from baker.pathtracer.scene import Reference, build_reference
 UP = (0.0, 0.0, 1.0)
 WITHIN = 0.002
 COPIES = 256
-# Seed of the reference. About 190 points are tested, and by chance one in 370 points deviates by more than
-# three standard errors. With seed 0, one point deviated by 3.2 standard errors. The mean error of this point
-# over 200 other seeds is 0.003 % +- 0.003 %.
+# Seed of the reference path tracer. About 190 points are tested, and by chance one in 370 points deviates
+# from its truth by more than three standard errors. With seed 0, one point deviated by 3.2 standard errors.
+# The mean error of this point over 200 other seeds is 0.003 % +- 0.003 %.
 SEED = 1
 
 
@@ -59,7 +59,10 @@ def traced(
     threads: int = 2,
     **how: Any,
 ) -> PointEstimate:
-    """Return path-traced irradiance at `where`: (position, normal), or a function of the pass number."""
+    """Return path-traced irradiance at `where`.
+
+    `where` is (position, normal), or a function that returns both for a pass number.
+    """
     with build_reference(scene, sky=sky, lambertian=True, threads=threads) as reference:
         options = PassOptions(**{"seed": SEED, **how})
         return _passes(irradiance_pass, reference, where, 3, passes, samples, {"options": options})
@@ -68,7 +71,7 @@ def traced(
 def traced_ao(
     scene: Scene, where: Any, distance: float, *, passes: int = 8, samples: int = 64
 ) -> PointEstimate:
-    """Return the ambient occlusion of the reference, 1 = unoccluded."""
+    """Return the ambient occlusion that the reference path tracer computes, 1 = unoccluded."""
     with build_reference(scene, threads=2) as reference:
         return _passes(
             ambient_occlusion_pass, reference, where, 1, passes, samples, {"seed": SEED, "distance": distance}
@@ -98,9 +101,9 @@ def assert_closed_form(found: PointEstimate, truth: Any, *, channel: int = 0, ro
     - the standard errors match the standard deviation of the copies.
 
     `rounding` is a relative error that is not noise. It comes from float32 and from ray origins, which are
-    offset by 1e-5 of the scene. Seeds are fixed. After a change of random numbers, a point may deviate
-    by more than three standard errors by chance. The result is incorrect only if the point also does so with
-    other seeds.
+    offset by 1e-5 of the scene's size. Seeds are fixed. After a change of random numbers, a point may by
+    chance deviate by more than three standard errors. Its result is incorrect only if it deviates that much
+    with other seeds, too.
     """
     truth = np.atleast_1d(np.asarray(truth, float))
     mean = found.mean[:, channel].reshape(len(truth), -1)

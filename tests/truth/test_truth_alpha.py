@@ -45,7 +45,7 @@ def floor_under(*cards, half=1.0, texels=40, light="directional", **where):
         (-half, 0, -half), (0, 0, 2 * half), (2 * half, 0, 0), builder.material(0.0), (texels, texels)
     )
     for k, make in enumerate(cards):
-        # The uv of card and floor have the same directions: columns run along z, rows along x.
+        # Texel columns of the card and of the floor run along z, and their rows run along x.
         builder.quad((-1, HIGH + 0.1 * k, -1), (0, 0, 2), (2, 0, 0), make(builder), (8, 8))
     if light:
         builder.light(light, 1.0, **(where or {"direction": SUN}))
@@ -190,7 +190,7 @@ def test_sky_through_blend_and_its_own_reflection():
 
 @pytest.mark.parametrize("mode", ["MASK", "BLEND"])
 def test_what_is_not_there_does_not_shine(mode):
-    """An emitter with holes in half of its area, or of alpha 0.5, gives half of the light."""
+    """With holes in half of its area, or with alpha 0.5, an emitter gives half of its light."""
     image = np.repeat(np.array([[0.0, 1.0]]), 2, axis=0)
     half = masked(image=image, emission=10.0) if mode == "MASK" else blended(0.5, emission=10.0)
 
@@ -205,9 +205,10 @@ def test_what_is_not_there_does_not_shine(mode):
 
 
 def test_reciprocity_of_a_leaf_with_holes():
-    """A white card with holes beside a lit wall lights the floor like a card without the cut-out part.
+    """Beside a lit wall, a white card with holes lights the floor like a card of the same shape.
 
-    The second card has the shape of the opaque part as geometry.
+    The holes of the first card are texels with alpha 0. The second card has triangles for the opaque part
+    only.
     """
     image = np.zeros((64, 64))
     image[:, 32:] = 1.0

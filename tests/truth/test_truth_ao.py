@@ -53,8 +53,8 @@ def test_floor_beside_a_long_wall_without_limit(height):
     builder, floor = wall_and_floor(height)
     truth = floor.texel_mean(lambda p: wall_ao(p[..., 0], height))[:, 0]
     found = [ao_rows(builder, floor, seed, ao_distance="inf") for seed in range(SEEDS)]
-    # `slack`: ray origins are raised by 5e-7 of the scene's size of 400 m. These 0.2 mm reduce the height of
-    # the wall above the ray origins.
+    # `slack`: ray origins are raised by 5e-7 of the scene's size of 400 m. This offset of 0.2 mm reduces the
+    # height of the wall above the ray origins.
     assert_unbiased(found, truth, least=0.002, slack=3e-4)
 
 
@@ -86,8 +86,8 @@ def test_percentage_is_of_the_diagonal():
     material = builder.material(0.5)
     builder.quad((0, 0, 0), (0, 0, 3), (4, 0, 0), material)
     builder.quad((0, 1, 0), (4, 0, 0), (0, 0, 3), material)
-    # The diagonal is sqrt(26) = 5.099 m. 19 % of it is less than the distance of the ceiling, 1 m, and 21 %
-    # is more.
+    # The diagonal is sqrt(26) = 5.099 m. 19 % of the diagonal is less than the 1 m from floor to ceiling, and
+    # 21 % is more.
     near = builder.bake(channels=["ao"], ao_distance="19%").lightmaps["ao"].value
     far = builder.bake(channels=["ao"], ao_distance="21%").lightmaps["ao"].value
     assert near[near > 0].min() == 1.0

@@ -43,7 +43,7 @@ def blocks(found, side):
     return mean.mean(axis=(1, 3)), np.sqrt((error**2).sum(axis=(1, 3))) / side**2
 
 
-# {estimator: passes} for about one percent of noise in the mean of the picture.
+# {estimator: number of passes that gives the mean of the picture a noise of about one percent}.
 ROOM_PASSES = {
     "uniform": 220, "cosine": 160, "stratified": 160, "light": 40, "bsdf": 100, "mis": 40, "mis-power": 40,
     "bdpt": 40,
@@ -91,7 +91,8 @@ def mirrored_light():
 
 
 def test_a_light_behind_a_mirror_lights_as_its_image_does():
-    # Only paths from the light find a point light that a mirror reflects; paths from the eye cannot.
+    # Only paths from the light find the way from a point light over a mirror to the floor. Paths from the eye
+    # cannot, because they never hit a point.
     scene, camera = mirrored_light()
     mean, error, _ = picture(scene, camera, "bdpt", 180, size=4, samples=1024)
     # Closed form: radiance of the floor from the light and its mirror image, averaged over each pixel.
@@ -124,7 +125,7 @@ def test_a_light_behind_a_mirror_lights_as_its_image_does():
 
 
 def gap_room():
-    """Return two rooms joined by a gap: one with an emitter that shines at the ceiling, one without light."""
+    """Return two rooms joined by a gap. One room has an emitter that faces the ceiling."""
     walls = box_quads((0, 0, 0), (4, 2, 2), inward=True, material=grey(0.7))
     screen = [
         Quad((2, 0, 0), (0, 0.95, 0), (0, 0, 2), grey(0.7, double_sided=True)),

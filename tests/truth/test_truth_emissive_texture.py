@@ -1,4 +1,4 @@
-"""Light of emissive textures with few lit texels, in bake and reference, compared with closed forms."""
+"""The light of emissive textures with few lit texels, in bake and path tracer, equals closed forms."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ N = 64
 RED, GREEN, BLUE = np.eye(3)
 # (x, z) centres and side of three emissive panels at a height of 1 m, metres.
 PANELS, SIDE = ((-0.7, 0.1), (0.0, -0.2), (0.7, 0.3)), 0.6
-# Radiance of lit texels for each panel, cd/m2; the panels have the same power.
+# Radiance of the lit texels of each panel, cd/m2. The values give all panels the same power.
 BRIGHT = (143 * 3e4, 143 * 3e4, 3e4)
 
 

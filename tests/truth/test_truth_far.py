@@ -1,4 +1,4 @@
-"""Rooms far from the origin get the same light as at the origin, in bake, reference, pictures and diff."""
+"""A room far from the origin has the same light as at the origin: baked, path-traced, rendered, in diff."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ def dense(patches, matrix):
 
 
 def between(group, patches, matrix):
-    """Return F (G, G) between groups: the sum of A_i F_ij over both groups / area of the first."""
+    """Return F (G, G) between groups of patches: the sum of A_i F_ij over pairs / area of the first group."""
     full = dense(patches, matrix).astype(np.float64) * patches.area[:, None]
     member = np.eye(group.max() + 1)[group]
     return (member.T @ full @ member) / (member.T @ patches.area)[:, None]

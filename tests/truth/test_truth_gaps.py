@@ -50,7 +50,7 @@ def test_gaps_stay_dark_and_the_floor_has_its_light(denoise):
     assert found[under].mean() < HEIGHT / SIDE
     x = (np.arange(COLUMNS * 64) + 0.5) / (COLUMNS * 64) * 2.0
     want = _sky_share(x).reshape(COLUMNS, 64).mean(axis=1)
-    # Plates 1 mm above the floor occlude no texels beside them.
+    # Plates 1 mm above the floor do not darken the floor texels beside the plates.
     free = np.where(under, np.nan, found)
     wrong = np.nanmean(free, axis=0) / want - 1.0
     # The mean over a column has the noise of about 4096 rays. The denoiser moves light from texels beside

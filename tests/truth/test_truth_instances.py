@@ -82,8 +82,8 @@ def test_instances_are_lit_as_copies_are(both, k):
     for channel in ("irradiance", "ao"):
         a, b = (np.array([p.at(x, n, channel) for x, n in zip(point, normal, strict=True)]) for p in both)
         size = max(float(b.max()), 1.0)
-        # The bakes have different charts and noise, and shadow edges cross different texels, so the
-        # difference is larger at some points.
+        # The two bakes have different charts and noise, and shadow edges cross different texels. Therefore
+        # only the median difference is below 1 %.
         assert np.median(np.abs(a - b)) < 0.01 * size
         assert np.abs(a - b).mean() < 0.02 * size
         assert abs(a.mean() / b.mean() - 1) < 0.02

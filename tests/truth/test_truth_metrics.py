@@ -1,4 +1,4 @@
-"""The reference differs from closed forms by at most three of its standard errors and at most 0.2 %."""
+"""The reference path tracer deviates from closed forms by at most three standard errors and 0.2 %."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from baker.pathtracer.estimators import ESTIMATORS
 
 SQUARE = np.array([[(0, 0, 0), (1, 0, 0), (1, 1, 0)], [(0, 0, 0), (1, 1, 0), (0, 1, 0)]]) - (0.5, 0.5, 0)
 
-# {estimator: samples of a pass}. Estimators without MIS find lights only by chance or only by
-# sampling them, so they need more samples.
+# {estimator: samples per point in a pass}. An estimator without MIS either hits lights by chance or samples
+# them, but does not combine both. It needs more samples.
 RAYS = {name: 256 if how.aim == 2 else 1024 for name, how in ESTIMATORS.items()}
 
 # {estimator: (albedo of each colour, passes of 256 x 64 paths)}. With uniform directions the variance is

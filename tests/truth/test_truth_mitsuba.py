@@ -38,7 +38,7 @@ def mi():
 
 
 def opened(name, **change):
-    """Return a scene and its reference, with flat normals and Lambertian materials."""
+    """Return a scene and its `Reference` for the path tracer, with flat normals and Lambertian materials."""
     from mitsuba_scene import flat
 
     scene = replace(load_scene(ROOT / "assets" / f"{name}.glb"), **change)

@@ -65,7 +65,8 @@ def test_bright_lights_next_door_take_no_samples(bright):
     alone, light = noise((1.0,), 0)
     for radiance, room in (((1.0, bright), 0), ((bright, 1.0, bright), 1)):
         beside, same = noise(radiance, room)
-        # Before the bake estimated which emitters are visible, the noise was 20 times that of `alone`.
+        # If the bake did not estimate which emitters are visible, the noise would be 20 times that of
+        # `alone`.
         assert beside < 1.3 * alone
         # The mean of a bake has a standard deviation of 0.1 % over seeds.
         assert same == pytest.approx(light, rel=4e-3)

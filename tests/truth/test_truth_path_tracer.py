@@ -1,4 +1,4 @@
-"""Texels of a Cornell bake agree with the simple path tracer of the tests within both standard errors."""
+"""Texels of a Cornell bake agree with the tests' simple path tracer within the standard errors of both."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lights without area: 1.0 lx at 1 m, inverse square, glTF's spot cone, and positions of shadow edges."""
+"""Lights without area: E is 1.0 lx at 1 m, inverse-square fall-off, glTF's spot cone, shadow edges."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def test_emitter_shines_from_its_front_and_from_both_if_double_sided(double_side
 
 
 def bounce_onto_floor(double_sided, lit_front, seed):
-    """Return E of a floor and of a sunlit wall at its edge. The horizontal sun does not light the floor."""
+    """Return E of a floor and of a wall at the floor's edge. The horizontal sun lights only the wall."""
     builder = SceneBuilder(64)
     floor = builder.quad((0, 0, -0.5), (0, 0, 1), (1, 0, 0), builder.material(0.0), (16, 16))
     edges = ((0, 1, 0), (0, 0, 1)) if lit_front else ((0, 0, 1), (0, 1, 0))

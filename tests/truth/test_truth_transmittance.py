@@ -1,4 +1,4 @@
-"""Light through coloured panes is multiplied by T = (1 - a) lerp(1, c, a), for all lights and bounces."""
+"""Coloured panes multiply light by T = (1 - a) lerp(1, c, a), for all kinds of lights and all bounces."""
 
 from __future__ import annotations
 

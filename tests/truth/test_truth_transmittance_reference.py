@@ -1,4 +1,4 @@
-"""Coloured panes in the reference: closed forms, agreement of estimators, agreement with a bake."""
+"""Coloured panes in the path tracer: closed forms, agreement of estimators, agreement with a bake."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ import pytest
 from scenes import SceneBuilder
 
 SKY = 1000.0
-# Largest E in the room, as a share of the sky's irradiance outside.
+# Largest permitted E in the room, as a share of the sky's irradiance outside.
 DARK = 1e-4
 
 

@@ -22,7 +22,7 @@ def critical(n_tests: int, degrees: float = np.inf) -> float:
 
 
 def assert_unbiased(sample: Any, truth: Any, *, least: float, slack: float = 0.0) -> None:
-    """Check that the mean over axis 0 of (seeds, ...) estimates equals the truth (...).
+    """Check that the mean of the estimates (seeds, ...) over seeds equals the truth (...).
 
     least : largest permitted standard error, relative to the truth, so that the test is significant
     slack : relative difference that is not noise (discretisation), given with its reason by the caller

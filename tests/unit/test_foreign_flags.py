@@ -1,4 +1,4 @@
-"""Flags of other bakers: the answer is a flag with the same purpose or a section of docs/LIMITS.md."""
+"""For a flag of another baker, the error names a flag of equal purpose or a section of docs/LIMITS.md."""
 
 from __future__ import annotations
 

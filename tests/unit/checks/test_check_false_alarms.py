@@ -45,7 +45,7 @@ def test_an_arch_that_lies_on_its_side_has_holes(tmp_path):
 
 
 def test_a_missing_face_of_a_convex_mesh_is_a_hole(tmp_path):
-    # One missing triangle is steep; the other is in the bottom, between flat neighbours.
+    # One of the missing triangles is steep. The other one is in the bottom, between flat neighbours.
     angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     rings = [(0.3, 0.0), (0.8, 0.4), (0.8, 0.8), (0.3, 1.2)]
     place = [[r * np.cos(a), y, r * np.sin(a)] for r, y in rings for a in angle]

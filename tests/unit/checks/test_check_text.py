@@ -1,4 +1,4 @@
-"""The text of `baker check`: findings of one code are one group, and hidden ones are announced."""
+"""The text of `baker check` groups findings by code, and says how many findings it does not list."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Emissive textures in `check`: mean radiance over the part that the uv cover, and place of the emission."""
+"""`check` computes where emissive textures emit, and their mean radiance over the area that the uv cover."""
 
 from __future__ import annotations
 

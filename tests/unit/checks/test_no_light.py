@@ -1,4 +1,4 @@
-"""Scenes without light: what is baked, and what is said about it before the bake."""
+"""Scenes without light: the values that are baked, and the warnings before the bake."""
 
 from __future__ import annotations
 

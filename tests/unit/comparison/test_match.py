@@ -21,7 +21,7 @@ CEILING = Quad((0, 0, 3), (0, 2, 0), (4, 0, 0))
 
 
 def plain_atlas(scene):
-    """Return an atlas with uv (0, 0) everywhere, for tests that read no lightmap."""
+    """Return an atlas whose uv are (0, 0) everywhere. It is for tests that read no lightmap."""
     layouts = []
     for k, instance in enumerate(scene.instances):
         mesh = scene.meshes[instance.mesh]

@@ -28,8 +28,9 @@ from baker.io.load import load_for_bake
 from baker.jobs.memory import estimate_peak
 
 ROOT = Path(__file__).parents[3]
-# Script that bakes a scene and prints its peak resident memory in bytes, and its rays, pages and texels.
-# `VmHWM` is the peak of this process only. `ru_maxrss` also covers the process that started this one.
+# Script that bakes a scene and prints its peak resident memory in bytes, and its rays, pages and texels. It
+# prefers `VmHWM`, the peak of the script's process only, to `ru_maxrss`, which includes the memory of the
+# process that started the script.
 BAKE = """
 import json, re, resource, sys
 from baker.core.settings import make_settings

@@ -1,4 +1,4 @@
-"""Numbers and percentages as people read them."""
+"""Numbers have three significant digits in messages, and percentages have no exponent."""
 
 from __future__ import annotations
 

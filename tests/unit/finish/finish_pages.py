@@ -103,7 +103,7 @@ def squared_distance(mask: NDArray) -> NDArray:
 
 
 def slow_nearest(mask: NDArray) -> NDArray:
-    """Return the squared distance of each texel to the nearest set texel, the minimum over all set texels."""
+    """Return the same squared distances as `squared_distance`, by a loop over all set texels."""
     rows, columns = np.nonzero(mask)
     r, c = np.indices(mask.shape)
     return ((r[..., None] - rows) ** 2 + (c[..., None] - columns) ** 2).min(-1)

@@ -1,4 +1,4 @@
-"""Denoised synthetic pages, compared with their light without noise, inside charts and at chart borders."""
+"""Denoised synthetic pages are compared with their noise-free light, inside charts and at chart borders."""
 
 from __future__ import annotations
 
@@ -90,7 +90,8 @@ def test_an_upper_bound_is_lowered_to_the_noise_that_is_seen(lit):
     right, lowered = clean(FITTED * error), clean(6 * error, bound=True)
     covered = chart >= 0
     assert wrong(lowered, right, covered) < 0.1 * wrong(clean(6 * error), right, covered)
-    # A bound equal to the true error is not lowered. With a bound of zero the page is not filtered.
+    # If the bound equals the true standard error, the denoiser does not lower the bound. With a bound of
+    # zero, the page is not filtered.
     assert wrong(clean(error, bound=True), clean(error), covered) < 1e-3
     np.testing.assert_array_equal(clean(0 * error, bound=True), noisy)
 

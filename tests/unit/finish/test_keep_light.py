@@ -43,7 +43,7 @@ def test_a_window_gets_the_share_that_the_filter_took(left: float) -> None:
 
 
 def test_each_texel_changes_by_the_same_share_of_its_light() -> None:
-    """The light rises by a factor of 100 across the page."""
+    """The light rises by a factor of 100 across the page, but the share of missing light is constant."""
     noisy, chart = _pages()
     noisy *= np.logspace(0, 2, noisy.shape[1], dtype=np.float32)[None, :, None]
     result = keep_light(noisy, np.float32(0.9) * noisy, chart, chart >= 0)
@@ -60,7 +60,7 @@ def test_colours_are_kept_apart() -> None:
 
 
 def test_nothing_crosses_to_another_chart_or_to_texels_that_were_not_chosen() -> None:
-    """Two charts meet at column 45, inside a block. Only the left chart has lost light."""
+    """Two charts meet at column 45, inside a block. Only in the left chart did denoising remove light."""
     noisy, chart = _pages()
     chart[:, 45:] = 1
     chosen = np.ones(chart.shape, bool)
@@ -73,7 +73,9 @@ def test_nothing_crosses_to_another_chart_or_to_texels_that_were_not_chosen() ->
 
 
 def test_few_texels_are_believed_less() -> None:
-    """The chart has 25 texels in each of four blocks.
+    """If a window has few texels, a smaller share of its missing light is restored.
+
+    The chart has 25 texels in each of four blocks.
 
     In the window around one of these blocks, the four blocks have the weights 1, 2/3, 2/3 and 4/9.
     """

@@ -20,8 +20,9 @@ from baker.jobs.executor import LocalJobExecutor
 from baker.jobs.jobs_file import Job
 from baker.jobs.run import BatchOptions, run_batch
 
-# A worker that does not bake: it notes the job in log.txt. It dies as often as the digit in the scene's name
-# says, after it has left a temporary folder as a bake does.
+# Program of a worker that does not bake, but appends each job to log.txt. The scene's name contains a digit n
+# and the name of a signal. At the first n tries of a job, the worker makes a temporary folder like that of a
+# bake, and sends this signal to itself.
 WORKER = """
 import json, os, pathlib, signal, sys
 for line in sys.stdin:

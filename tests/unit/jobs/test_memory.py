@@ -1,4 +1,4 @@
-"""Parsing of memory sizes, and the dependence of the memory estimate on settings and scene."""
+"""Memory sizes are parsed, and the memory estimate depends on settings and scene as expected."""
 
 from __future__ import annotations
 

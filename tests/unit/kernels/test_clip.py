@@ -37,7 +37,8 @@ def test_areas_are_those_of_the_polygons():
         polygon = naive.cut_polygon(corner, x0, y0)
         assert polygon_area(out, n) == pytest.approx(naive.shoelace(polygon)[0], abs=1e-12)
         if naive.shoelace(polygon)[0] > 1e-9:
-            # Both polygons have the same corners; those of `out` are relative to the square.
+            # Both polygons have the same corners. The corners in `out` are relative to the corner (x0, y0) of
+            # the square.
             ours = out[:n] + np.array((x0, y0))
             assert all(np.linalg.norm(polygon - c, axis=1).min() < 1e-9 for c in ours)
             assert all(np.linalg.norm(ours - c, axis=1).min() < 1e-9 for c in polygon)

@@ -258,7 +258,7 @@ def test_the_two_halves_of_mis_make_one_whole():
         dark += not lit
         if not lit:
             continue
-        # The density of light samples per solid angle.
+        # Compute the density of light samples per solid angle.
         c = int(emitters.row[m, CLUSTER])
         density = chance[c] * emitters.row[m, SHARE] / world.geometry.area[t] * distance**2 / abs(facing)
         light = mis_weighted(cosine, float(density), float(n_light), float(n_hemisphere))

@@ -198,7 +198,7 @@ def test_a_rounded_facet_is_lifted_to_the_curve():
     assert np.linalg.norm(middle) < 1 < np.linalg.norm(origin) < 1.05
     np.testing.assert_allclose(normal, middle / np.linalg.norm(middle), atol=1e-5)
     np.testing.assert_allclose(place_one(corner, corner, 0, 0)[0], corner[0], atol=2e-5)
-    # Points on the back are not moved, nor are points whose vertex normals deviate too far from the face.
+    # A point is not moved if it is on the back, or if vertex normals deviate too far from the face normal.
     np.testing.assert_allclose(place_one(corner, corner, 1 / 3, 1 / 3, flip=True)[0], middle, atol=2e-5)
     leaning = np.tile([[0.9, 0.0, 0.43589]], (3, 1))
     np.testing.assert_allclose(place_one(corner, leaning, 1 / 3, 1 / 3)[0], middle, atol=2e-5)

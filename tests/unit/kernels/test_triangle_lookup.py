@@ -91,7 +91,7 @@ def test_pixels_beside_a_chart_know_its_texels():
 
 
 def test_two_sides_without_a_texel_are_looked_up_nowhere():
-    """If no two-sided triangle has texels, no back has an entry, so lookups must not return one."""
+    """If no two-sided triangle has texels, no back has a texel entry, so lookups must not return an entry."""
     from baker.radiosity.triangle_lookup import build_triangle_lookup
 
     world = quad_world([Quad((0, 0, 0), (1, 0, 0), (0, 1, 0)), Quad((2, 0, 0), (1, 0, 0), (0, 1, 0))], 16)

@@ -1,4 +1,4 @@
-"""Emissive textures with many repeats: the work is limited, but the power is the same as without a limit."""
+"""For emissive textures with many repeats, the work is limited; the power is the same as without a limit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parts of textured emitters: hits and samples find the same part, and the total power is preserved."""
+"""Textured emitters are divided into parts. Hits and samples find the same part, and power is preserved."""
 
 from __future__ import annotations
 

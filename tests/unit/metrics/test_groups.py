@@ -84,7 +84,8 @@ def test_rare_light_in_one_half_of_the_reference_is_no_deviation():
     rng = np.random.default_rng(5)
     truth = np.ones((200, 3))
     halves = tuple(truth + 0.02 * rng.standard_normal((200, 1)) for _ in range(2))
-    # One half has additional red light of rare paths. It is the same at all points.
+    # One half of the reference has additional red light, as from rare paths. This light is the same at all
+    # points.
     halves[0][:, 0] += 0.2
     reference = 0.5 * (halves[0] + halves[1])
     found = compare_group(
@@ -96,7 +97,8 @@ def test_rare_light_in_one_half_of_the_reference_is_no_deviation():
 
 def test_light_where_none_should_be():
     dark = np.zeros((20, 3))
-    # The value is about 40 times the light of one missed path.
+    # The reference is 0. The value is about 40 times the light that a single path, missed by all 4096
+    # samples, could have added.
     leak = compare_group(points(dark + 0.05, dark, samples=4096), 100.0)
     assert leak.bias == pytest.approx(0.05 / (1e-3 * 100))
     assert 0.4 < leak.sure_bias < leak.bias
@@ -124,7 +126,7 @@ def test_few_points_need_more():
 
 
 def halved(rng, light, noise):
-    """Return two halves (n, 1) of a reference with the light `light` (n,).
+    """Return the two halves (n, 1) of a reference, which are independent estimates of the light `light` (n,).
 
     The mean of the halves has the relative standard error `noise` (n,), each half sqrt(2) times as much.
     """
@@ -154,8 +156,8 @@ def test_bright_and_dark_points_in_one_group_are_no_noise_of_the_map():
         )
         sure += found.sure_noise > 0
         apart += found.typical > 4 * found.typical_noise
-    # Both medians are the smallest error among the 12 dark, noisy points. They often differ by more than a
-    # factor of 4, although the map is exact.
+    # Both medians, of the errors and of the expected noise, are the smallest error among the 12 dark, noisy
+    # points. They often differ by more than a factor of 4, although the map is exact.
     assert apart > 30
     assert sure == 0
 

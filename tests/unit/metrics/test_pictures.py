@@ -1,4 +1,4 @@
-"""Tests of a map as an image: few levels, clipping, blur, dilation, outliers."""
+"""Maps with few levels, clipping, blur, wrong dilation or outliers are detected in synthetic images."""
 
 from __future__ import annotations
 

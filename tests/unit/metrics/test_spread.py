@@ -11,7 +11,7 @@ from baker.metrics.spread import own_error
 
 
 def drawn(rng, n, own, noise, light=None):
-    """Return value, reference, its standard error, and half the difference of its halves, (n,) each.
+    """Return value, reference, standard error and half the difference of the reference's halves, (n,) each.
 
     `own` is the relative error of the value, and `noise` the relative standard error of the reference.
     """
@@ -26,8 +26,8 @@ def drawn(rng, n, own, noise, light=None):
 def test_it_is_the_error_that_was_put_in(own, noise):
     rng = np.random.default_rng(0)
     found = [own_error(*drawn(rng, 200, own, noise), 0.01, 3.0) for _ in range(200)]
-    # The estimate cannot be negative, so its mean is above 0 for an exact map. If the own error is smaller
-    # than the noise, the estimate is too small.
+    # The estimate cannot be negative, so for an exact map its mean is above 0. If the map's own error is
+    # smaller than the noise of the reference, the estimate is too small.
     off = 0.03 if own == 0 else 0.003 if noise <= own else 0.015
     assert np.mean([f.own for f in found]) == pytest.approx(own, abs=off)
     assert np.mean([f.lower <= own <= f.upper for f in found]) > 0.97
@@ -64,5 +64,5 @@ def test_a_reference_noisier_than_its_passes_show_is_taken_at_its_halves():
     rng = np.random.default_rng(4)
     value, reference, noise, apart = drawn(rng, 200, 0.0, 0.1)
     assert own_error(value, reference, 0.3 * noise, apart, 0.01, 3.0).lower < 0.02
-    # If the halves did not differ, the noise would be attributed to the map.
+    # If the halves of the reference do not differ, its noise is attributed to the map.
     assert own_error(value, reference, 0.3 * noise, 0 * apart, 0.01, 3.0).lower > 0.05

@@ -76,7 +76,7 @@ def test_parts_of_a_textured_triangle_have_its_power():
     size = emitters.row[:, EMITTER_PART + 2]
     np.testing.assert_allclose(emitters.row[:, EMITTER_AREA], size**2, rtol=1e-5)
     assert (emitters.row[:, EMITTER_TEXTURED] == 1).all()
-    # Black texels have no part, so the parts' area is smaller than the quad's area of 2 m2.
+    # The emitter table has no part for black texels, so the area of all parts is less than the quad's 2 m2.
     assert emitters.row[:, EMITTER_AREA].sum() < 2.0
 
 

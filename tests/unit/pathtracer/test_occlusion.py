@@ -1,4 +1,4 @@
-"""Neighbouring points share packets of occlusion rays. Order and packets do not affect the results."""
+"""Neighbouring points share packets of occlusion rays. Neither order nor packets affect the results."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_points_of_one_place_keep_their_order(n):
 
 
 def test_scattered_points_are_left_as_they_are():
-    """Points in rows are dense if consecutive points are near, even if the rows are far apart."""
+    """Points are dense if consecutive points are near each other, even if rows of points are far apart."""
     x, y = np.meshgrid(np.linspace(0, 8, 400), np.linspace(0, 8, 20))
     rows = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
     assert are_dense(rows, 0.05)

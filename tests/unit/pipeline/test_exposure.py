@@ -1,4 +1,4 @@
-"""The suggested exposure of a bake, against its definition."""
+"""The suggested exposure of a bake agrees with its definition."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ WHITE = np.ones((100, 3), np.float16)
 
 
 def pages(value):
-    """Return four pages of 5 x 5 grey texels with these values in the order of pixels."""
+    """Return four pages of 5 x 5 grey texels. `value` has their values, page by page and row by row."""
     return np.repeat(np.float32(value), 3).reshape(4, 5, 5, 3)
 
 

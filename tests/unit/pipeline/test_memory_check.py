@@ -1,4 +1,4 @@
-"""A bake that does not fit into memory is refused; control group limits count."""
+"""A bake that does not fit into memory is refused. The limit of a Linux control group applies, too."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a bake says while it runs: expected seconds of stages, compiling, and texels that did not converge."""
+"""A running bake reports expected durations, compilation, and texels whose light did not converge."""
 
 from __future__ import annotations
 

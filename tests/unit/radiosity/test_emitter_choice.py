@@ -72,7 +72,7 @@ def test_without_a_wall_nothing_is_hidden():
 
 
 def test_a_tile_over_two_rooms_falls_into_parts():
-    """A tile with both floors is divided into consecutive parts, each with the emitters that it sees."""
+    """A tile with both floors is divided into consecutive parts, each with the emitters visible from it."""
     world, _ = world_of((1.0, 1e4), texels=20)
     n_front = world.texels.n_front
     _, made = choices(world, np.arange(n_front))

@@ -1,4 +1,4 @@
-"""Counting, merging, balancing and multiplying sparse rows, compared with dense matrices."""
+"""Kernels that count, merge, balance and multiply sparse rows are compared with dense matrices."""
 
 from __future__ import annotations
 

@@ -258,8 +258,8 @@ def test_both_estimates_of_an_emitter_meet_lamberts_formula(n_light):
     # The variance is estimated as if the 16 batches of samples were independent. The samples are stratified
     # over all batches, so the reported standard error is about 2.3 times the spread over seeds.
     assert 1.5 < np.sqrt(np.mean(variance) / np.var(sampled, axis=0, ddof=1).mean()) < 3.5
-    # The emitter is unoccluded, so only one shadow ray is traced from each of the 16 points. Packets with few
-    # texels of the floor are an exception.
+    # The emitter is unoccluded, so only one shadow ray is traced from each of the 16 points. A packet with
+    # only few texels of the floor traces more.
     shadow = direct.rays - 4 * world.texels.n
     assert 16 * len(own) <= shadow <= (16 if n_light == 16 else 30) * len(own)
 

@@ -1,4 +1,4 @@
-"""The radiosity solve, compared with dense linear algebra."""
+"""The radiosity solve is compared with dense linear algebra."""
 
 from __future__ import annotations
 
@@ -252,7 +252,7 @@ def test_every_patch_has_its_light_however_bright_others_are(passage, albedo, di
 
 
 def test_a_bright_ground_does_not_end_the_solve_of_a_room():
-    """A bright patch that sees nothing converges at once. A room still converges as if it were alone."""
+    """A bright patch without visible patches converges at once. A room beside it converges as if alone."""
     matrix, _, area = rooms(1, 40, 0.0, 10)
     albedo, source = np.full((40, 3), 0.8), np.random.default_rng(11).random((40, 3))
     alone = solve_radiosity(matrix, source, albedo, area, bounces=None, progress=silent)

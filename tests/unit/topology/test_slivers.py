@@ -9,7 +9,7 @@ from baker.topology.slivers import SLIVER, find_slivers
 
 
 def height_over_length(corner):
-    """Return the height over the longest side, divided by that side, by Heron's formula."""
+    """Return a triangle's height over its longest side divided by that side, by Heron's formula."""
     sides = [float(np.linalg.norm(corner[k] - corner[k - 1])) for k in range(3)]
     s = sum(sides) / 2
     area = max(s * (s - sides[0]) * (s - sides[1]) * (s - sides[2]), 0.0) ** 0.5

@@ -1,4 +1,4 @@
-"""`find_solids` distinguishes solids from sheets by their edges, and from rooms by their contents."""
+"""`find_solids` distinguishes solids from sheets by edges, and solids from rooms by what is inside."""
 
 from __future__ import annotations
 

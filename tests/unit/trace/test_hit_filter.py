@@ -72,7 +72,7 @@ def test_refused_hits_do_not_count(case, width):
     same = prim[both] == truth[both, 1]
     assert (~same).sum() <= 1
     np.testing.assert_allclose(reach[both][same], truth[both, 0][same], rtol=2e-5)
-    # Geometry 1 has the triangles with a hit filter, and geometry 0 has the others.
+    # Embree geometry 1 has the triangles with a hit filter, and geometry 0 has all other triangles.
     assert (geom[both] == see.chosen[prim[both]]).all()
     assert set(geom[both]) == {0, 1}
     plain = cast(RayScene(position, triangle, threads=1), origin, direction, width=width)

@@ -1,4 +1,4 @@
-"""TEXCOORD_1 of the scene is kept unchanged, packed as one rectangle per object, replaced, or refused."""
+"""The scene's TEXCOORD_1 are kept unchanged, packed as one rectangle per object, replaced, or refused."""
 
 from __future__ import annotations
 

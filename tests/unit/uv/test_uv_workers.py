@@ -57,7 +57,7 @@ def test_a_worker_that_is_killed_twice_is_a_lack_of_memory(jobs, lose) -> None:
 
 
 def test_where_the_library_crashes_twice_the_triangles_have_no_chart(jobs, lose) -> None:
-    """They are laid out without it."""
+    """The triangles get the chart -1, so `baker` lays them out without xatlas."""
     lose(signal.SIGSEGV, 2)
     answers = pool.run_jobs(jobs[:1], 1, silent, 1.0)
     assert (answers[0].chart == -1).all()

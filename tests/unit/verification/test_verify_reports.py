@@ -1,4 +1,4 @@
-"""What `verify` says about its result: the verdict, the plot of light levels, settings as flags in JUnit."""
+"""`verify` reports the verdict, a plot of light levels and, in JUnit files, settings as flags."""
 
 from __future__ import annotations
 

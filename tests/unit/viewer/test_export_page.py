@@ -1,4 +1,4 @@
-"""The viewer page as static files: complete, without paths of the machine, and never over files of others."""
+"""The exported viewer page is complete, contains no local paths, and replaces no files of the user."""
 
 from __future__ import annotations
 

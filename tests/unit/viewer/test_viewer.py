@@ -1,4 +1,4 @@
-"""The data that the viewer's page gets, and requests that the server refuses."""
+"""The viewer's server sends the data of a bake to the page, and refuses all other requests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`baker.export` writes its folder as a whole or not at all."""
+"""`baker.export` writes its folder completely or not at all."""
 
 from __future__ import annotations
 

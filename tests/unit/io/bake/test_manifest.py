@@ -1,4 +1,4 @@
-"""The `bake.json` of hand-made bakes, compared with its JSON schema, the bake and docs/MANIFEST.md."""
+"""The `bake.json` of hand-made bakes agrees with its JSON schema, with the bake and with docs/MANIFEST.md."""
 
 from __future__ import annotations
 

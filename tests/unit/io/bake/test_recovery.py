@@ -87,8 +87,8 @@ def out(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.Monk
     """Yield an output folder with an old bake and files of the user.
 
     The parameter selects how a new bake replaces the old one. Either the two folders are exchanged in one
-    step, or the files are moved one by one. The reason for the latter is that the file system cannot exchange
-    folders, or that the output folder is the working directory.
+    step, or the files are moved one by one. Files are moved one by one if the file system cannot exchange
+    folders, or if the output folder is the working directory.
     """
     out = tmp_path / "parent" / "out"
     out.mkdir(parents=True)

@@ -1,4 +1,4 @@
-"""`scene.glb` of scenes that were made without a glTF file: it is loaded and compared with the scene."""
+"""For scenes that do not come from a glTF file, `scene.glb` is loaded and compared with the scene."""
 
 from __future__ import annotations
 
