@@ -1,4 +1,4 @@
-"""The progress of a whole bake: the share that is done, and the time left, from reports of its stages."""
+"""Estimates the share of a bake that is done, and the time left, from reports of its stages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The names and summaries of the subcommands, in the order of the help."""
+"""Lists the names and summaries of the subcommands, in the order of the help."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The part of `baker check` that fixes and repairs: `--fix`, `--repair`, `-o`."""
+"""Fixes and repairs scenes for `baker check`: `--fix`, `--repair`, `-o`."""
 
 from __future__ import annotations
 

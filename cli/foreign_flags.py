@@ -1,4 +1,4 @@
-"""Answers to flags of other bakers: the flag of baker with the same purpose, or the section of LIMITS.md.
+"""Answers flags of other bakers: the flag of baker with the same purpose, or the section of LIMITS.md.
 
 Without these answers, an unknown flag such as `--hdri` gets the flag with the most similar spelling, which
 usually has another purpose.

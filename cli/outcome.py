@@ -1,4 +1,4 @@
-"""Text output that `verify` and `diff` share: worst texels and limits."""
+"""Writes the text output that `verify` and `diff` share: worst texels and limits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The report of a bake: a short text, and for `--json` parts of the manifest."""
+"""Writes the report of a bake: a short text, and for `--json` parts of the manifest."""
 
 from __future__ import annotations
 

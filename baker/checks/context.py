@@ -1,4 +1,4 @@
-"""The context of a check: the scene, defective triangles included, and values that several rules use."""
+"""Holds the data of a check: the scene with its defective triangles, and values that several rules use."""
 
 from __future__ import annotations
 

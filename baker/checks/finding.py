@@ -1,4 +1,4 @@
-"""The classes of a finding: its location, counts, severity and advice."""
+"""Defines a finding of a check: its location, counts, severity and advice."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Patterns of accepted findings, which do not fail a check.
+"""Parses patterns of accepted findings, which do not fail a check.
 
 A pattern is `CODE` or `CODE@OBJECT`. Both parts may contain `*` for any letters.
 """

@@ -1,4 +1,4 @@
-"""The rules that every bake runs, for defects that neither the importer nor the unwrapper reports."""
+"""Runs the rules that are part of every bake: defects that neither importer nor unwrapper reports."""
 
 from __future__ import annotations
 

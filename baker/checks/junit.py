@@ -1,4 +1,4 @@
-"""The result of a check as JUnit test cases, one for each pair of scene and rule."""
+"""Writes the result of a check as JUnit test cases, one for each pair of scene and rule."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Properties of the faces, edges and pieces of a mesh that several rules use.
+"""Computes properties of the faces, edges and pieces of a mesh that several rules use.
 
 Each property is computed on first use and then stored.
 """

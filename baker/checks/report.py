@@ -1,4 +1,4 @@
-"""The result of a check as JSON and as text."""
+"""Writes the result of a check as JSON and as text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The registry of rules, with the severity, advice and documentation of each rule.
+"""Registers the rules of `baker check`, with the severity, advice and documentation of each rule.
 
 A rule is a function that finds one kind of defect: it takes a `CheckContext` and yields `RawFinding` objects.
 The code of a rule is its name in reports, such as `zero-area-faces`. A rule is decorated with `check` and

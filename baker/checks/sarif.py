@@ -1,4 +1,4 @@
-"""The result of a check as SARIF, a format that code hosts show beside the checked files.
+"""Writes the result of a check as SARIF, a format that code hosts show beside the checked files.
 
 Based on: OASIS, Static Analysis Results Interchange Format (SARIF) Version 2.1.0, 2020.
 """

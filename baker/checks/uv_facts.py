@@ -1,4 +1,4 @@
-"""Properties of the lightmap uv of a mesh that several rules use: ranges, areas and charts."""
+"""Computes properties of the lightmap uv of a mesh that several rules use: ranges, areas and charts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The triangles of all instances in world space, and rays that are traced against them."""
+"""Collects the triangles of all instances in world space, and traces rays against them for checks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The atlas: the page and the lightmap uv of each instance.
+"""Defines the atlas: the page and the lightmap uv of each instance.
 
 A chart is a connected piece of surface in uv, a page is one image, and padding is the empty border of a
 chart.

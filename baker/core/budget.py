@@ -1,4 +1,4 @@
-"""Limits on the work of a bake, and estimates of its texels, rays and memory before it runs.
+"""Limits the work of a bake, and estimates its texels, rays and memory before it runs.
 
 The stages of a bake, the rules of `baker check` and the memory limit of `baker batch` use these estimates.
 """

@@ -1,4 +1,4 @@
-"""Conversion from sRGB to linear Rec.709, the colour space of all colours in baker.
+"""Converts sRGB to linear Rec.709, the colour space of all colours in baker.
 
 Based on: IEC 61966-2-1 (the sRGB curve).
 """

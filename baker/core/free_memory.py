@@ -1,4 +1,4 @@
-"""The memory that this process may use: what the machine has free, and limits of control groups."""
+"""Reads the memory that this process may use: what the machine has free, and limits of control groups."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The whole scene as one list of world-space triangles with lightmap uv.
+"""Converts the whole scene to one list of world-space triangles with lightmap uv.
 
 The triangles of a mesh are repeated for each of its instances. Rays can hit each triangle in the list, and
 each has its own texels.

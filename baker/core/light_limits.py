@@ -1,4 +1,4 @@
-"""The largest intensity and emission that a bake accepts."""
+"""Refuses lights and materials whose intensity or emission is too large for a bake."""
 
 from __future__ import annotations
 

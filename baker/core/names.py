@@ -1,4 +1,4 @@
-"""The error for an unknown name of a setting, channel, export, metric or rule."""
+"""Builds the error for an unknown name of a setting, channel, export, metric or rule."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers as people read them: percentages and values with three significant digits, without exponents."""
+"""Formats numbers for readers: percentages and values with three significant digits, without exponents."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All triangles of a scene file, invalid ones included, for checks and repairs of the file."""
+"""Holds all triangles of a scene file, invalid ones included, for checks and repairs of the file."""
 
 from __future__ import annotations
 

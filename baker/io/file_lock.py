@@ -1,4 +1,4 @@
-"""File locks of the operating system, which are released when the process that holds them ends."""
+"""Takes file locks of the operating system, which are released when the process that holds them ends."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Text of files in HTML pages."""
+"""Escapes text from files for HTML pages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes in which nothing emits light: which channels are baked by default, and the warning about it."""
+"""Chooses the default channels of scenes in which nothing emits light, and warns about such scenes."""
 
 from __future__ import annotations
 

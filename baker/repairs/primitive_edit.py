@@ -1,4 +1,4 @@
-"""A primitive of a glTF mesh, and the edit that a fix or a repair makes to it."""
+"""Defines and applies the edit that a fix or a repair makes to a primitive of a glTF mesh."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A mesh with one vertex for each position, and the distance between two such meshes."""
+"""Builds meshes with one vertex for each position, and measures the distance between two such meshes."""
 
 from __future__ import annotations
 

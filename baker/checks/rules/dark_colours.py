@@ -12,8 +12,8 @@ from baker.checks.rule import check
 from baker.checks.rules.vertex_colours import BLACK, COLOURED
 from baker.core.readable import percent
 
-# Mean of the vertex colours below which they count as dark, and factor of the base colour from which a
-# material without a texture counts as white, which vertex colours are meant to colour.
+# Mean of the vertex colours below which they count as dark. Base colour factor from which a material without
+# a texture counts as white; vertex colours are then the colour of the surface.
 DARK, WHITE = 0.3, 0.9
 
 

@@ -13,8 +13,8 @@ from baker.checks.rule import check
 from baker.core.light_kind import kind_of
 from baker.core.readable import number
 
-# Implausible median of the direct irradiance of lights with a position, lx. Offices have 500, an overcast day
-# 10 000.
+# Limit of the median of the direct irradiance of lights with a position, lx. Offices have 500 lx, an overcast
+# day has 10 000 lx.
 DAYLIGHT = 10_000.0
 # Luminous efficacy with which exporters convert watts to lumens, lm/W.
 EFFICACY = 683.0

@@ -21,7 +21,7 @@ from baker.topology.winding_number import first_inside
 _ROUNDING = 1e-4
 # Share of a mesh's area. If the inside-out parts have less than this share, the finding is a warning.
 MOST_WRONG = 0.05
-# Number of points of each other part that are tested for being inside.
+# Number of points of each other part that are tested whether they are inside the part.
 _WITNESSES = 8
 # Condition number of a transform from which an object counts as flattened.
 _FLATTENED = 1e6
@@ -103,7 +103,10 @@ def _may_be(facts: MeshFacts) -> bool:
 
 
 class _Parts:
-    """The parts of a mesh: their faces, bounding boxes and test points, computed once for all parts."""
+    """The parts of a mesh, with their faces, bounding boxes and test points.
+
+    A part is a set of faces that are connected by edges, see `MeshFacts.piece`.
+    """
 
     def __init__(self, facts: MeshFacts) -> None:
         self.facts = facts

@@ -13,7 +13,8 @@ from baker.checks.rule import check
 from baker.core.light_kind import kind_of
 from baker.core.readable import percent
 
-# Fewest sample points on an object, and the share of the light on both sides that its front may get at most.
+# Smallest number of sample points on a reported object, and the largest share of the light on its two sides
+# that its front gets.
 _FEWEST, _FRONT = 8, 0.02
 
 

@@ -60,7 +60,7 @@ def _rounding(uv: NDArray[np.float64]) -> tuple[float, str] | None:
             whole = np.rint(level)
             if np.abs(level - whole).max() > _SLACK:
                 continue
-            # A regular grid lies on every second or third level, or on still fewer.
+            # Ignore a coarser regular grid, whose values use only every k-th of these levels.
             used = np.unique(whole.astype(np.int64))
             if len(used) >= _FEWEST_VALUES and np.gcd.reduce(used) == 1:
                 return width / steps, f"{bits} bits"
@@ -71,5 +71,5 @@ def _is_half(values: NDArray[np.float64]) -> bool:
     """Return whether values are half floats, with steps finer than those from 0.5 to 1 as evidence."""
     if not (values == values.astype(np.float16)).all():
         return False
-    # Otherwise the values lie on a regular grid, which half floats can represent.
+    # If all values are multiples of `_HALF_SPACING`, they may be a regular grid instead of half floats.
     return bool((np.abs(values / _HALF_SPACING - np.rint(values / _HALF_SPACING)) > 0).any())

@@ -25,9 +25,10 @@ _SIDE = 512
 def shared(context: CheckContext) -> Iterator[RawFinding]:
     """Objects whose TEXCOORD_1 overlaps that of another object.
 
-    The lightmap uv of each object is valid alone, as in a kit whose pieces fill 0..1 each, but together they
-    do not fit on one page. A bake then packs the objects as rectangles, and `uv_scale` and `uv_offset` of
-    `bake.json` describe where. Overlaps are searched on a grid of 512 x 512 points.
+    The lightmap uv of each object is valid alone, but together they do not fit on one page. An example is
+    a kit in which the uv of each object fills 0..1. A bake then packs the objects as rectangles, and
+    `uv_scale` and `uv_offset` of `bake.json` describe where. Overlaps are searched on a grid of 512 x 512
+    points.
     """
     from baker.checks.kernels.uv_pairs import cover_pairs
 

@@ -26,7 +26,7 @@ _SHORT = 60
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Call `recover`, because a killed process may have left the folder incomplete, and return the manifest.
+    """Return the manifest of an output folder, after `recover` has undone writes of killed processes.
 
     Parameters
     ----------

@@ -87,9 +87,9 @@ def new_document(scene: Scene, atlas: Atlas) -> tuple[Packer, list[BakedUse], li
 
 
 def scene_name(scene: Scene) -> Json:
-    """Return the key `name` of a scene; none for a scene that was read, which is named after its file.
+    """Return the glTF key `name` of a scene, or no key if the scene was read and is named after its file.
 
-    So a renamed file gives the same bytes.
+    A renamed file therefore gives the same bytes.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The result of editing a glTF primitive: copies of its old vertices, or new vertices."""
+"""Holds the result of editing a glTF primitive: copies of its old vertices, or new vertices."""
 
 from __future__ import annotations
 

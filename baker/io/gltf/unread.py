@@ -1,7 +1,7 @@
-"""Warnings about data of a glTF file that is missing or broken and not needed for baking.
+"""Warns about data of a glTF file that is missing or broken and not needed for baking.
 
-Examples are normal maps and unused files. They do not stop a bake, but they are missing when another program
-displays `scene.glb`.
+Examples are normal maps and unused files. Such data does not stop a bake, but it is missing when another
+program displays `scene.glb`.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def image_bytes(document: GltfDocument, number: int) -> bytes:
 def unreadable_textures(
     document: GltfDocument, material: JsonObject, name: str, read: Set[tuple[str, str]], reported: set[int]
 ) -> list[SceneWarning]:
-    """Among the textures of a material that baking does not use, return a warning for each unreadable one.
+    """Return a warning for each unreadable texture of a material, except textures that baking reads.
 
     Parameters
     ----------

@@ -63,7 +63,7 @@ class ChannelData:
 
     @property
     def interior(self) -> NDArray[np.bool_]:
-        """Return (n,) bool: points outside gaps, not tilted, in texels that valid surface mostly covers.
+        """Return (n,) bool: points outside gaps, not tilted, in texels covered to at least `_MIN_COVERED`.
 
         Light levels, regions, objects and charts are compared at these points only.
         """

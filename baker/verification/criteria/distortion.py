@@ -44,16 +44,16 @@ def evaluate(data: ChannelData) -> CriterionResult:
     }
     name = data.channel
     remarks = {
-        "shifted": f"{name} fits better {down} rows and {right} columns further: the page is shifted",
+        "shifted": f"{name} fits better if moved by {down} rows and {right} columns: the page is shifted",
         "shifted_charts": f"{name} of {'; '.join(charts)}",
-        "blurred": f"{name} is off where its light curves, as a blurred page is",
+        "blurred": f"{name} has errors where its light curves: the page was blurred",
         "few_levels": f"{name} holds few, evenly spaced levels: the page was rounded",
-        "misfilled_share": f"{name} beyond the borders of charts is not like that at the borders (dilation)",
+        "misfilled_share": f"{name} in the padding differs from that at the borders of charts (dilation)",
         "cut_off": f"{name} is cut off at its largest value",
     }
     if power is not None:
         remarks["exponent_error"] = (
-            f"{name} follows the {power:.2f}th power of the truth: a curve was applied"
+            f"{name} follows the reference to the power of {power:.2f}: a curve such as gamma was applied"
         )
     return CriterionResult(metrics, remarks)
 
@@ -74,7 +74,7 @@ def _shifted_charts(data: ChannelData) -> list[str]:
             owner = data.bake.scene.instances[int(points.owner[mine[0]])].name
             found.append(
                 f"the chart at row {rest // size}, column {rest % size} of page {first}, of '{owner}', fits"
-                f" better {down} rows and {right} columns further"
+                f" better if moved by {down} rows and {right} columns"
             )
     return found
 
