@@ -228,7 +228,7 @@ def pyramid(image):
 
 
 def hit_pixel(uv, page, double_sided, size, n_pages, t, u, v, front):
-    """Return the pixel index of a hit, -1 for a black back. Pixels of backs follow after all pixels."""
+    """Return the pixel index of a hit, -1 for a black back. Indices of backs follow those of all fronts."""
     if not front and not double_sided[t]:
         return -1
     x, y = ((1 - u - v) * uv[t, 0] + u * uv[t, 1] + v * uv[t, 2]).astype(float) * size

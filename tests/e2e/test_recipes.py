@@ -56,7 +56,7 @@ def make(folder, limits=LIMITS):
 
 
 def told(folder, name):
-    """Return the numbers of test cases and failures of a JUnit file."""
+    """Return the number of test cases and the number of failures in a JUnit file."""
     root = ElementTree.parse(folder / "reports" / name).getroot()
     return int(root.get("tests")), int(root.get("failures"))
 

@@ -23,7 +23,7 @@ REMOVED_KEYS = frozenset(
 REPLACED = (
     # Progress lines are printed every few seconds, so their number and content depend on the machine.
     (re.compile(r"^[a-z][a-z ]*:  \d+ %.*\n", re.MULTILINE), ""),
-    # Durations, and the spaces before them, whose number depends on the number of digits.
+    # Durations and rates. Spaces before them are replaced, too, because they depend on the number of digits.
     (re.compile(r"^\d+\.\d\d s: .*$", re.MULTILINE), lambda m: re.sub(r"\d+\.\d\d", "<time>", m[0])),
     (re.compile(r" *\b\d[\d.,]* (Mrays/s|s\b)"), r" <number> \1"),
     # The size of the manifest depends on the number of digits of its times.
@@ -33,7 +33,7 @@ REPLACED = (
     (re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?(Z|\+00:00)?"), "<date>"),
 )
 TEXTS = frozenset({".html", ".md", ".xml", ".svg", ".txt", ".toml", ".cfg", ".csv"})
-# Length of a text, characters: only the hash of a longer text is recorded.
+# Longest text that is recorded, characters. Of a longer text, only the hash is recorded.
 LONGEST = 500_000
 
 Entry = dict[str, Any]

@@ -1,4 +1,4 @@
-"""Ambient occlusion beside walls with and without a distance limit, and in open and closed scenes."""
+"""Ambient occlusion equals closed forms beside walls, with and without distance limit, and in boxes."""
 
 from __future__ import annotations
 

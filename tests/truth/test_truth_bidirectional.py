@@ -1,4 +1,4 @@
-"""Pictures of mixed scenes: estimators agree, mirrored lights are correct, and `bdpt` reduces variance."""
+"""In pictures of mixed scenes, estimators agree, mirrored light is correct, and `bdpt` reduces variance."""
 
 from __future__ import annotations
 

@@ -110,7 +110,7 @@ def test_diff_finds_the_far_surface(folders):
 
 @pytest.mark.parametrize("around", ["nothing", "sky", "terrain", "centimetres"])
 def test_a_wall_of_a_centimetre_shades_the_floor_whatever_is_around(around):
-    """AO = (1 + d / sqrt(d^2 + h^2)) / 2 beside a long wall of height h, in scenes of any size."""
+    """AO is (1 + d / sqrt(d^2 + h^2)) / 2 at a distance d from a long wall of height h in any scene."""
     unit = 100.0 if around == "centimetres" else 1.0
     at = {"terrain": (900.0, 0.0, -700.0), "centimetres": (3e4, 0.0, 5e4)}.get(around, (0.0, 0.0, 0.0))
     h, builder = 0.01 * unit, SceneBuilder(64)

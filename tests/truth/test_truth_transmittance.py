@@ -102,7 +102,7 @@ def test_a_pane_elsewhere_leaves_an_unoccluded_light_its_closed_form():
 
 
 def test_a_pane_that_stands_in_the_floor_has_a_bright_and_a_dim_side():
-    """A texel that the pane crosses stores the light of one of its sides."""
+    """A texel that the pane crosses stores the light of one side of the pane."""
     builder = SceneBuilder(64)
     floor = builder.quad((-1, 0, -1), (0, 0, 2), (2, 0, 0), builder.material(0.0), (24, 24))
     builder.quad((0.013, -0.2, -1.2), (0, 1.6, 0), (0, 0, 2.4), glass(builder, alpha=0.9), (4, 4))

@@ -1,4 +1,4 @@
-"""The albedo that the check `albedo` reports: factor times texture times vertex colour."""
+"""The check `albedo` reports the product of factor, texture and vertex colour."""
 
 from __future__ import annotations
 

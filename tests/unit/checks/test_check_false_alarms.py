@@ -1,4 +1,4 @@
-"""Sound scenes that resemble flawed ones, and flaws that resemble sound scenes."""
+"""Checks report no sound scene that resembles a flawed one, and find flaws that resemble sound geometry."""
 
 from __future__ import annotations
 

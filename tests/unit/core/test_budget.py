@@ -1,4 +1,4 @@
-"""The check `cost` and the memory limit use the same estimate, which is within 30 % of measured bakes."""
+"""The check `cost` and the memory limit use one estimate, which is within 30 % of the measured values."""
 
 from __future__ import annotations
 

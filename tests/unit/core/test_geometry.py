@@ -1,4 +1,4 @@
-"""World geometry of instances: winding, normals and areas under mirroring and non-uniform scale."""
+"""`world_geometry` gives instances the correct winding, normals and areas if mirrored or scaled."""
 
 from __future__ import annotations
 

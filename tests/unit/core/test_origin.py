@@ -13,7 +13,7 @@ from baker.core.scene import Instance, PunctualLight
 
 
 def room(at=(0.0, 0.0, 0.0), scale=1.0, quads=()):
-    """Return a scene of a room of 2 m with a crate, moved by node transforms, and of `quads`, not moved."""
+    """Return a scene of a room with a crate, and of `quads`. Node transforms move only room and crate."""
     inside = box_quads((-1, 0, -1), (1, 2, 1), inward=True)
     crate = box_quads((0.1, 0, 0.1), (0.5, 0.4, 0.5), inward=False)
     scene = quad_scene([*inside, *crate, *quads])

@@ -12,7 +12,10 @@ from baker.core.precision import coarse_objects
 
 
 def floor(at, by="node", size=2.0, scale=1.0):
-    """Return a scene of one floor at x = `at`, moved by its node's transform or by its vertex positions."""
+    """Return a scene of one floor at x = `at`.
+
+    `by` selects whether the node's transform or the vertex positions contain this offset.
+    """
     scene = quad_scene([Quad((-size / 2, 0, -size / 2), (0, 0, size), (size, 0, 0))])
     if by == "vertices":
         mesh = replace(scene.meshes[0], position=scene.meshes[0].position + np.float32([at, 0, 0]))

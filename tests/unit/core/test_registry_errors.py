@@ -1,4 +1,4 @@
-"""Plugin registries, and the messages of errors."""
+"""Plugin registries find the plugins of a package, and error messages name the plugins that exist."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bake settings: refused values, error messages, and values with a special meaning such as `inf` or `10%`."""
+"""Bake settings refuse invalid values with a clear message, and accept values such as `inf` and `10%`."""
 
 from __future__ import annotations
 

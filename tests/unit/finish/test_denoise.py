@@ -55,7 +55,8 @@ def test_noise_falls_inside_and_on_chart_borders(lit, share, inner_gain, border_
     border, inner = rings(chart)
     assert wrong(clean, truth, inner) * inner_gain < wrong(noisy, truth, inner)
     assert wrong(clean, truth, border) * border_gain < wrong(noisy, truth, border)
-    # If the denoiser sees black between the charts, the outermost ring of texels gets 10 to 17 % too dark.
+    # If the texels between the charts were black in the denoiser's input, the outermost ring of texels would
+    # become 10 to 17 % too dark.
     assert abs(np.mean(clean[border] / truth[border]) - 1.0) < 0.015 + 0.07 * share
 
 
@@ -127,8 +128,9 @@ def test_surroundings_continue_a_chart_by_its_slope_and_leave_charts_alone():
     expected = ramp(0, x[None, :], x[:, None])
     distance = pages.squared_distance(covered)
     near = (distance > 0) & (distance <= 9)
-    # Mirroring without the slope would have an error of twice slope times distance, up to 8 %. The tolerance
-    # is for partly covered texels: their value is that of the centroid, up to half a texel from the centre.
+    # If `surround_charts` mirrored values at the border without their slope, the error would be twice the
+    # slope times the distance, up to 8 %. The tolerance is needed because the value of a partly covered texel
+    # is that of the covered part's centroid, up to half a texel from the texel's centre.
     assert np.abs(picture[near, 0] / expected[near] - 1.0).max() < 0.025
     assert picture.min() > 0.0
 

@@ -99,7 +99,8 @@ def test_rare_bright_samples_are_not_lost(seed: int) -> None:
     """Each of the 64 samples of a texel finds the light with a small probability.
 
     The probability falls from 0.3 % by a factor of e^3 across the page. Without `keep_light`, 11 to 13 % of
-    the page's light were missing. The tolerance is for chart borders and for the share that is not restored.
+    the page's light would be missing. The tolerance is for chart borders and for the share that is not
+    restored.
     """
     chart = np.zeros((128, 128), np.int32)
     random = np.random.Generator(np.random.PCG64(seed))

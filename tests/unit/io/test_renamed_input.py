@@ -1,4 +1,4 @@
-"""The name of the input changes no written file but `bake.json`, and there only the path of the input."""
+"""If the input is renamed, only `bake.json` changes, and in it only the path of the input."""
 
 from __future__ import annotations
 

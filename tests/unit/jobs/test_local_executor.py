@@ -49,7 +49,7 @@ def start_fake(module: str) -> subprocess.Popen[bytes]:
 
 @pytest.fixture
 def run(tmp_path, monkeypatch):
-    """Return a function: runs jobs of scenes with these names, and returns outcomes and tries of each job."""
+    """Return a function that runs jobs of the named scenes and returns each job's outcome and tries."""
     monkeypatch.setattr(executor, "start_module", start_fake)
 
     def run(*names: str, slots: int = 1):

@@ -83,7 +83,7 @@ def random_emitters(n, seed, two_sided=0.2):
 
 def chances(emitters, centre, radius):
     chance, running = np.zeros((2, len(emitters.power)), np.float32)
-    # Two ray origins: their bounding box has this centre, and half of its diagonal is `radius`.
+    # Two ray origins are opposite corners of a box with this centre. Half of the box's diagonal is `radius`.
     reach = np.full(3, radius / np.sqrt(3.0))
     origin = np.float32([[centre - reach, centre + reach]])
     cluster_chances(emitters, origin, chance, running)

@@ -187,7 +187,7 @@ def place_one(position, normal, b1, b2, flip=False):
 
 
 def test_a_rounded_facet_is_lifted_to_the_curve():
-    """On a facet with vertex normals of a sphere, its middle is moved to the sphere, and corners are not."""
+    """If a facet has the vertex normals of a sphere, its middle is moved to the sphere. Its corners stay."""
     corner = np.array([[0.3, 0.0, 1.0], [-0.2, 0.3, 1.0], [-0.2, -0.3, 1.0]])
     corner /= np.linalg.norm(corner, axis=1, keepdims=True)
     middle = corner.mean(axis=0)
@@ -228,7 +228,8 @@ def test_a_point_inside_geometry_is_replaced_by_a_valid_one(slanted):
     for n, i in enumerate(chosen):
         good = [k for k in range(N_POINTS) if int(mask[i]) >> k & 1] or list(range(N_POINTS))
         for w, k in enumerate(wanted[n]):
-            # Invalid points are replaced by valid ones in turn, so that these are used about equally often.
+            # Invalid points are replaced by the valid points in turn, so that all valid points are used about
+            # equally often.
             truth = int(k) if k in good else good[k % len(good)]
             assert valid_point(mask[i], k) == truth
             for mine, every in zip(ours, free, strict=True):

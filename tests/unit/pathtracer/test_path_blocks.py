@@ -1,4 +1,4 @@
-"""Blocks of eight paths in SIMD lanes, compared with single paths, and the random numbers of paths."""
+"""Blocks of eight paths in SIMD lanes agree with single paths, and random numbers of paths are uniform."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which kernels are compiled in advance, depending on the materials of the scene."""
+"""Kernels are compiled in advance only if the materials of the scene need them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Gather, AO, light samples and shadow rays, compared with Python loops over rays in a small room."""
+"""Gather, AO, light samples and shadow rays agree with Python loops over rays in a small room."""
 
 from __future__ import annotations
 

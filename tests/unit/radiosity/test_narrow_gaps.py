@@ -73,7 +73,7 @@ def test_patches_end_at_the_mouth_of_a_gap(world):
 
 
 def test_in_a_narrow_gap_each_texel_is_a_patch_and_light_does_not_cross_it():
-    """A sheet is a tenth of a texel above a floor. Only the part of the floor at one edge of it is lit."""
+    """A sheet lies a tenth of a texel above a floor. Only the floor near the sheet's +x edge is lit."""
     floors = [Quad((9 * k, 0, 0), (0, 0, 4), (4, 0, 0)) for k in range(8)]
     sheet = Quad((1, 0.02, 1), (1.5, 0, 0), (0, 0, 1.5))
     world = quad_world([*floors, sheet], 64, inset=0.0)

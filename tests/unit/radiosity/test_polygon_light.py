@@ -1,4 +1,4 @@
-"""Irradiance of triangles in closed form, compared with another formula and with sums over small pieces."""
+"""The closed-form irradiance of triangles agrees with another formula and with sums over small pieces."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ def test_walls_split_the_floor_into_regions_and_a_gap_below_them_changes_nothing
         left = sides.texels.position[: sides.texels.n_front][floor][:, 0] < 0.5
         assert len(np.unique(region[left])) == len(np.unique(region[~left])) == 1
         assert region[left][0] != region[~left][0]
-        # The region of texels of other charts is the index of the chart.
+        # Texels of all other charts have the index of their chart as region.
         other = sides.texels.region[~floor]
         assert (other == sides.texels.chart[: sides.texels.n_front][~floor]).all()
 

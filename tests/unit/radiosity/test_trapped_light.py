@@ -1,4 +1,4 @@
-"""Warnings for closed rooms of high albedo rho, in which bounces multiply light by 1 / (1 - rho)."""
+"""A bake warns of closed rooms of high albedo rho, where bounces multiply light by 1 / (1 - rho)."""
 
 from __future__ import annotations
 

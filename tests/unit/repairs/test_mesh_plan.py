@@ -246,7 +246,8 @@ def test_open_meshes_and_one_sided_bands_keep_their_winding():
 
 
 def test_a_projective_plane_is_named():
-    # The hemi-icosahedron has 6 vertices and 10 faces. Each edge is in two faces, but it has no outside.
+    # The hemi-icosahedron has 6 vertices and 10 faces. Each edge is in two faces, but the surface is not
+    # orientable, so it has no outside.
     triangle = np.array(
         [
             [0, 1, 2],

@@ -75,7 +75,8 @@ def test_small_holes_are_closed_with_the_vertices_of_their_rims(tmp_path):
         strict=True,
     ):
         assert known[p.tobytes()] == t.tobytes()
-    # The distance is the largest one of the new surface from the old one, in the patch of two faces.
+    # The reported distance is the largest distance of the new surface from the old one. It is found in the
+    # patch of two faces.
     moved = {fix.change.distance for fix in fixed.fixed}
     assert len(moved) == 1
     assert 0.01 < moved.pop() < 0.1
@@ -113,7 +114,8 @@ def test_a_splinter_goes_and_a_wall_stays(tmp_path):
     fixed, glb, primitive = repaired(b, tmp_path)
     assert told(fixed) == {"non-manifold-edges": (1, 0), "non-manifold-faces": (4801, 4800)}
     assert len(places(glb, primitive)[1]) == 4800
-    # Only the splinter is removed. Its tip is 7 mm from a vertex of the torus, and nearer to the surface.
+    # Only the splinter is removed. Its tip is 7 mm from a vertex of the torus, and less than that from the
+    # torus's surface.
     assert 0.001 < fixed.fixed[0].change.distance < 0.007
 
     position, triangle = box()

@@ -1,4 +1,4 @@
-"""Atlases with a requested density, with several pages, and with more charts than pages can hold."""
+"""`unwrap` handles a requested density, several pages, and more charts than the pages can hold."""
 
 from __future__ import annotations
 

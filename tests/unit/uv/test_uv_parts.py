@@ -118,7 +118,8 @@ def test_nothing_is_placed_on_a_ring():
     shapes = Shapes(
         corner, np.array([0, 8, 10]), np.array([[40, 40], [10, 10.0]]), np.ones(2), np.zeros(2, bool)
     )
-    # An outline has one span per row, which includes the hole of the ring. The squares are placed beside it.
+    # An outline has one span per row, so the outline of the ring includes its hole. The squares are placed
+    # beside the ring.
     result = pack(shapes, np.array([0, 1, 1]), np.ones(2), (64, 2), silent, 0.0)
     assert result.placed == 3
     for x, y in result.position[1:]:

@@ -1,4 +1,4 @@
-"""Points that `verify` compares: rooms and gaps around them, footprints of lookups at edges, charts."""
+"""`verify` assigns its points to rooms, gaps and charts, and gives lookups at edges their footprints."""
 
 from __future__ import annotations
 

@@ -152,7 +152,7 @@ def test_the_next_bake_is_such_a_command(out: Path) -> None:
 
 @pytest.mark.parametrize("read", [read_manifest, inspect_path, lambda out: inspect_path(out / "bake.json")])
 def test_so_is_a_command_that_only_reads(out: Path, read: Callable[[Path], object]) -> None:
-    """`verify`, `diff` and `view` read the manifest, too. It is invalid here, so each function raises."""
+    """`verify`, `diff` and `view` restore a bake before they read its manifest, which here is invalid."""
     step = 0
     while ends_by_kill(lambda: write_new(out), step):
         with pytest.raises(InputError, match="manifest is damaged"):
