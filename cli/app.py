@@ -1,4 +1,4 @@
-"""The `baker` command: finds the subcommand, runs it, and converts failures to exit codes.
+"""Runs the command `baker`: finds the subcommand, runs it, and converts failures to exit codes.
 
 No module that is slow to import is imported here, so that `baker --help` is fast. The module of a subcommand
 and the settings are imported only if that subcommand runs.

@@ -1,4 +1,4 @@
-"""The decorator of subcommands: adds flags for settings, and runs the steps that all subcommands share."""
+"""Defines the decorator of subcommands, which adds flags for settings and runs the steps that they share."""
 
 from __future__ import annotations
 

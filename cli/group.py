@@ -1,4 +1,4 @@
-"""The group of all subcommands, which imports the module of a subcommand only when it runs."""
+"""Defines the group of all subcommands, which imports the module of a subcommand only when it runs."""
 
 from __future__ import annotations
 

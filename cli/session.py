@@ -1,4 +1,4 @@
-"""State that a run of the command line shares with its subcommand: the output streams and the stop flag."""
+"""Holds the output streams and the stop flag that a run of the command line shares with its subcommand."""
 
 from __future__ import annotations
 

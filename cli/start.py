@@ -1,4 +1,4 @@
-"""Entry point of the command `baker`: handles Ctrl-C and missing streams before it imports other modules."""
+"""Starts the command `baker`: handles Ctrl-C and missing streams before it imports other modules."""
 
 from __future__ import annotations
 

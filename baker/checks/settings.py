@@ -1,4 +1,4 @@
-"""The settings of a check.
+"""Defines the settings of a check.
 
 They come from flags or keyword arguments, from the table `[check]` of a configuration file, and from the
 scene's extras.

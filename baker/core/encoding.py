@@ -1,4 +1,4 @@
-"""The interface of image encodings: each file of `baker.encodings` writes and reads one image format.
+"""Defines the interface of image encodings: each file of `baker.encodings` writes and reads one image format.
 
 Callers look up an encoding by its name in `ENCODINGS` and do not import it. A new format is therefore added
 as one new file. Each field of its options class becomes a setting of a bake: a flag of the command line, a

@@ -1,4 +1,4 @@
-"""The interface of executors, which run the tiles of the ray stages in this process or on a cluster."""
+"""Defines the interface of executors, which run the tiles of ray stages in this process or on a cluster."""
 
 from __future__ import annotations
 

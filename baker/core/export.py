@@ -1,4 +1,4 @@
-"""The interface of exports: each file of `baker.exporters` converts a finished bake for one engine.
+"""Defines the interface of exports: each file of `baker.exporters` converts a finished bake for one engine.
 
 Callers look up an export by its name in `EXPORTS` and do not import it. A new engine is therefore supported
 by one new file.

@@ -1,4 +1,4 @@
-"""Finished maps, the status of their texels, and the result of a bake."""
+"""Defines finished maps, the status of their texels, and the result of a bake."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from baker.core.scene import Scene, SceneWarning
 COARSE = 0.1
 # Share of a mesh's vertices that are ignored as outliers when the size of its coordinates is measured.
 _OUTLIERS = 0.1
-# Largest number of vertices read from each mesh.
+# Approximate number of vertices that are read from a mesh with more vertices.
 _VERTICES = 1 << 15
 
 

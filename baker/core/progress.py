@@ -1,4 +1,4 @@
-"""The interface of progress callbacks, which receive reports and may cancel the work."""
+"""Defines the interface of progress callbacks, which receive reports and may cancel the work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The base class of results: a line of text for consoles, a table with a small picture for notebooks."""
+"""Defines the base class of results: one line for consoles, a table with a small picture for notebooks."""
 
 from __future__ import annotations
 

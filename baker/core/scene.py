@@ -1,4 +1,4 @@
-"""The scene that is baked: immutable arrays in metres, +Y up, linear Rec.709.
+"""Defines the scene that is baked: immutable arrays in metres, +Y up, linear Rec.709.
 
 Importers create the `Scene`. Meshes are in object space and shared by instances; `baker.core.geometry`
 transforms them to world space.

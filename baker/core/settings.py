@@ -1,4 +1,4 @@
-"""The settings of a bake, with description, unit, range and default.
+"""Defines the settings of a bake, with description, unit, range and default.
 
 The flags of the command line, the keys of the configuration file, the keywords of `baker.bake` and the
 settings page of the docs are generated from `BakeSettings`.

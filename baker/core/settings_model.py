@@ -1,4 +1,4 @@
-"""The base of all settings: pydantic models whose fields become flags, configuration keys and docs.
+"""Defines the base of all settings: pydantic models whose fields become flags, configuration keys and docs.
 
 Every command declares its settings as one subclass of `Settings`. Each field is made with `setting`, which
 takes its description, unit, range and default. `docs/make_settings_page.py` prints the fields,

@@ -1,4 +1,4 @@
-"""Names of the stages of a bake and of other work, used in progress reports, timings and ray counts."""
+"""Names the stages of a bake and of other work, for progress reports, timings and ray counts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The texels that lie on surfaces, with the data of each texel that the ray stages read.
+"""Defines the texels that lie on surfaces, with the data of each texel that the ray stages read.
 
 A texel buffer has n entries. Entries 0 to n_front - 1 are the front sides, one for each texel of the pages.
 Then follow the back sides of texels on double-sided surfaces. If another surface passes through a texel,

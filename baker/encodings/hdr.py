@@ -1,4 +1,4 @@
-"""Radiance HDR files: 8-bit RGB mantissas with a shared exponent, run-length coded, row 0 at the top.
+"""Encodes Radiance HDR files: 8-bit RGB mantissas with a shared exponent, run-length coded, row 0 at the top.
 
 `value = mantissa * 2^(exponent - 136)`, as current readers decode it. Ward's original code adds 0.5 to the
 mantissa. Here mantissas are rounded to nearest, so decoding without the 0.5 has no bias.

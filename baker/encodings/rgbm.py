@@ -1,4 +1,4 @@
-"""RGBM: high dynamic range in an 8-bit RGBA PNG, for engines and phones without float textures.
+"""Encodes high dynamic range in an 8-bit RGBA PNG (RGBM), for engines and phones without float textures.
 
 `value = top * (rgb * a)^GAMMA`, where rgb and a are the stored bytes / 255, without sRGB decoding. The alpha
 channel `a` is the largest of the three `(value / top)^(1 / GAMMA)`, rounded up, so that rgb never exceeds 1.

@@ -1,4 +1,4 @@
-"""Code shared by the exports: `lightmap.json`, copies of a bake's files, unique node names, and README.md."""
+"""Writes what exports share: `lightmap.json`, copies of a bake's files, unique node names, README.md."""
 
 from __future__ import annotations
 

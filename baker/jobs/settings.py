@@ -1,4 +1,4 @@
-"""The settings of a batch."""
+"""Defines the settings of a batch."""
 
 from __future__ import annotations
 

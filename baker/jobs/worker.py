@@ -1,4 +1,4 @@
-"""A process that bakes one job after another, so that libraries and kernels are loaded only once.
+"""Bakes one job after another in a worker process, so that libraries and kernels are loaded only once.
 
 The process reads one line of JSON for each job from stdin, and writes lines of JSON to stdout. A job is
 {"scene", "out", "settings", "force"}. While a job runs, the process writes {"stage", "fraction"}. At the end

@@ -1,4 +1,4 @@
-"""The settings of fixes and repairs."""
+"""Defines the settings of fixes and repairs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The settings of `verify`: number of points, effort of path tracing, and limits."""
+"""Defines the settings of `verify`: number of points, effort of path tracing, and limits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rules about faces and vertices that a bake cannot use, and about slivers."""
+"""Reports faces and vertices that a bake cannot use, and slivers."""
 
 from __future__ import annotations
 

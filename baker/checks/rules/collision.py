@@ -1,4 +1,4 @@
-"""Rule about meshes that engines use only for collision, recognised by their names."""
+"""Reports meshes that engines use only for collision, recognised by their names."""
 
 from __future__ import annotations
 

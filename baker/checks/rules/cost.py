@@ -1,4 +1,4 @@
-"""Rule that estimates the cost of a bake: texels, pages, rays, memory, time, and the share of each object."""
+"""Estimates the cost of a bake: texels, pages, rays, memory, time, and the share of each object."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rule about vertex colours that take away most of the base colour of a material."""
+"""Reports vertex colours that take away most of the base colour of a material."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rule about lights with a position that light a scene like daylight."""
+"""Reports lights with a position that light a scene like daylight."""
 
 from __future__ import annotations
 

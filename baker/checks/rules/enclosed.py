@@ -1,4 +1,4 @@
-"""Rule about faces that lie inside solids and are therefore never visible."""
+"""Reports faces that lie inside solids and are therefore never visible."""
 
 from __future__ import annotations
 

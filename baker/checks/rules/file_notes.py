@@ -1,4 +1,4 @@
-"""Rule that reports those warnings of the importer that no other rule reports."""
+"""Reports those warnings of the importer that no other rule reports."""
 
 from __future__ import annotations
 

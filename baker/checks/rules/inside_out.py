@@ -1,4 +1,4 @@
-"""Rule about closed parts of meshes whose fronts point inwards although nothing is inside."""
+"""Reports closed parts of meshes whose fronts point inwards although nothing is inside."""
 
 from __future__ import annotations
 

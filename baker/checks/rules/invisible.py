@@ -1,4 +1,4 @@
-"""Rule about objects that are invisible everywhere because of their alpha.
+"""Reports objects that are invisible everywhere because of their alpha.
 
 Alpha is factor x texture x vertex alpha. A point is visible if alpha >= cutoff (mode MASK) or if alpha > 0
 (mode BLEND).

@@ -1,4 +1,4 @@
-"""Rules about direct irradiance at sample points, as `baker.checks.direct_light` estimates it."""
+"""Checks direct irradiance at sample points, as `baker.checks.direct_light` estimates it."""
 
 from __future__ import annotations
 

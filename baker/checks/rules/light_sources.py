@@ -1,4 +1,4 @@
-"""Rules about lights, emissive surfaces and albedo."""
+"""Checks lights, emissive surfaces and albedo."""
 
 from __future__ import annotations
 

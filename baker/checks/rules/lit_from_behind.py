@@ -1,4 +1,4 @@
-"""Rule about open surfaces whose back receives the light."""
+"""Reports open surfaces whose back receives the light."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rules about the connectivity of meshes: edges, vertices, holes and winding."""
+"""Checks the connectivity of meshes: edges, vertices, holes and winding."""
 
 from __future__ import annotations
 

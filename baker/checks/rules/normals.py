@@ -1,4 +1,4 @@
-"""Rules about vertex normals and duplicate vertices."""
+"""Checks vertex normals, and reports duplicate vertices."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rules about intersecting faces of a mesh and about overlapping coplanar faces of different objects."""
+"""Reports intersecting faces of a mesh, and overlapping coplanar faces of different objects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rules about the scales of nodes, positions far from the origin and the size of the scene."""
+"""Checks the scales of nodes, positions far from the origin and the size of the scene."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rules about the layout of a lightmap uv: missing, not finite, outside the page, overlapping, degenerate."""
+"""Checks the layout of a lightmap uv: missing, not finite, outside the page, overlapping, degenerate."""
 
 from __future__ import annotations
 

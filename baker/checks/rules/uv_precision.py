@@ -1,4 +1,4 @@
-"""Rule about lightmap uv whose numbers are stored too coarsely for the resolution of the page."""
+"""Reports lightmap uv whose numbers are stored too coarsely for the resolution of the page."""
 
 from __future__ import annotations
 

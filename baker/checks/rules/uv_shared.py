@@ -1,4 +1,4 @@
-"""Rule about objects whose lightmap uv overlap each other on one page."""
+"""Reports objects whose lightmap uv overlap each other on one page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rules about a lightmap uv at the resolution of the bake: chart size, padding, density, stretch, filling."""
+"""Checks a lightmap uv at the resolution of the bake: chart size, padding, density, stretch, filling."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rule about vertex colours that make a material black."""
+"""Reports vertex colours that make a material black."""
 
 from __future__ import annotations
 

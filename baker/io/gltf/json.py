@@ -1,4 +1,4 @@
-"""Typed access to the members of parsed JSON, with errors that name the member."""
+"""Gives typed access to the members of parsed JSON, with errors that name the member."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The interface of a criterion: it takes the data of a channel and returns metrics, a table and remarks."""
+"""Defines the interface of criteria, which compute metrics, a table and remarks from a channel's data."""
 
 from __future__ import annotations
 
