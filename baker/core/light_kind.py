@@ -1,4 +1,4 @@
-"""Defines the interface of light kinds; each file of `baker.lights.kinds` registers one kind.
+"""Defines the interface of kinds of lights without area; each file of `baker.lights.kinds` registers one.
 
 A `LightKind` contains everything that differs between kinds: the unit, the glTF representation, the
 irradiance at points for the bake, the emission for the path tracer, and the power. Other code reads the

@@ -65,7 +65,7 @@ def inspect_path(path: Path | str, *, allow_outside: bool = False) -> dict[str, 
 
 
 def _bake(folder: Path) -> dict[str, Any]:
-    """Return the main parts of a manifest, and the state of every file compared with its hash."""
+    """Return the main entries of a manifest, and whether each file is as baked, changed or missing."""
     manifest = read_manifest(folder)
     files = [
         {**entry, "state": file_state(folder / entry["file"], entry["sha256"])} for entry in manifest["files"]
