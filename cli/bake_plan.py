@@ -42,7 +42,7 @@ class BakePlan:
         Parameters
         ----------
         stage : str
-            Name of the stage. Stages that are not expected, which are parts of other stages, do not change
+            Name of the stage. Stages that are not in `expected` are parts of other stages. They do not change
             the share.
         fraction : float
             Share of the stage that is done, 0 to 1.

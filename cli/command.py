@@ -130,9 +130,9 @@ def command(
     name : str
         Name of the subcommand, as in `commands.COMMANDS`.
     *models : type of Settings
-        Models whose fields become flags. If two models have a field with the same name, the flag is that of
-        the first model. If a configuration file can contain settings of a model, the flag `--config` is
-        added.
+        Models whose fields become flags. If two models have a field with the same name, the flag is made from
+        the field of the first model. If a configuration file can contain settings of a model, the flag
+        `--config` is added.
     fixed : dict, optional
         Settings with a fixed value. They have no flag.
     common : str

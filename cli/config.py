@@ -17,7 +17,7 @@ from baker.io.toml_file import read_toml
 TOP_TABLE = "bake"
 # Names of all tables that a configuration file may have.
 TABLES = ("bake", "check", "verify", "render", "diff", "repair")
-# Settings that are lists. Values from the command line are added to those of the file.
+# Settings that are lists. Values from the command line are added to the values of the file.
 _ADDED = {"ignore"}
 
 

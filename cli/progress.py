@@ -97,7 +97,7 @@ class Reporter:
             self.noted.append(message)
 
     def follow(self, plan: BakePlan) -> None:
-        """Show the progress of a whole bake from now on, instead of that of each stage."""
+        """Show the progress of a whole bake from now on, instead of the progress of each stage."""
         self._plan = plan
         if self._bar is not None:
             if self._task is not None:

@@ -159,7 +159,8 @@ def points_inside(
 ) -> NDArray[np.float64]:
     """Return one uniform random point inside each triangle, (n, 3) float64, metres.
 
-    With `part`, (n, 3) rows of `Emission.inside`, the point lies in that part of the triangle.
+    `part` (n, 3) has one row of `Emission.inside` for each triangle. If it is given, the point lies in this
+    part of the triangle.
     """
     u, v = random.random((2, len(triangle)))
     over = u + v > 1.0

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from baker.checks.world_triangles import WorldTriangles
 from baker.core.scene import Texture
 
-# Triangles with an emissive texture are subdivided into parts. This is the largest difference between the
-# number of parts and the number of these triangles.
+# Triangles with an emissive texture are subdivided into parts. This is the largest number of parts, over all
+# triangles together, minus the number of these triangles.
 _MOST_PARTS = 2048
 
 
@@ -24,8 +24,9 @@ class Emission:
     triangle : (E,) int64
         Index of the triangle in `WorldTriangles`.
     inside : (E, 3) float64
-        The part of the triangle: barycentrics (b1, b2) of its corner 0, and its relative size. (0, 0, 1) is
-        the whole triangle. See `baker.lights.emissive_texture.Parts`.
+        Position and size of the part in the triangle: barycentrics (b1, b2) of the part's corner 0, and edge
+        length of the part divided by that of the triangle. (0, 0, 1) is the whole triangle. See
+        `baker.lights.emissive_texture.Parts`.
     radiance : (E, 3) float64, cd/m2
         Mean over the part.
     area : (E,) float64, m2

@@ -68,7 +68,7 @@ def check_scenes(
 ) -> tuple[list[CheckReport], list[Unreadable]]:
     """Check scene files one after the other.
 
-    With more than one file, an unreadable file is returned as `Unreadable` and the others are still checked.
+    With more than one file, an unreadable file is returned as `Unreadable`, and the other files are checked.
     A single unreadable file raises.
 
     Parameters

@@ -1,7 +1,7 @@
 """Defines the atlas: the page and the lightmap uv of each instance.
 
-A chart is a connected piece of surface in uv, a page is one image, and padding is the empty border of a
-chart.
+A chart is a piece of surface that is connected in uv. A page is one image. Padding consists of the empty
+texels between charts.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class InstanceLayout:
     triangle : (T, 3) int32
         Indices into the lightmap vertices. Row t is triangle t of the mesh, with the same order of corners.
     chart : (T,) int32
-        Chart of each triangle, numbered from 0 over the whole atlas.
+        Index of each triangle's chart. Charts are numbered from 0 over the whole atlas.
     kept : bool
         Whether the uv is TEXCOORD_1 of the scene file, up to scale and offset.
     texels_per_metre : float

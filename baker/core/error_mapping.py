@@ -34,7 +34,7 @@ def explain(error: BaseException) -> BakerError | None:
     Returns
     -------
     BakerError or None
-        None if no `BakerError` corresponds to the exception, which is then a bug in `baker`.
+        None for all other exceptions: they are caused by bugs in `baker`.
     """
     if isinstance(error, BakerError):
         return error

@@ -92,7 +92,7 @@ def _shown(letter: str) -> str:
     if letter in "\n\r\t":
         return " "
     # Also escape the last two code points of each Unicode plane, which are not characters. XML forbids two of
-    # them.
+    # these code points.
     if letter in _JOINERS or not (unicodedata.category(letter) in _ESCAPED or ord(letter) & 0xFFFE == 0xFFFE):
         return letter
     return letter.encode("unicode_escape", "surrogatepass").decode("ascii")

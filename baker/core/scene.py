@@ -62,9 +62,9 @@ class Material:
     Attributes
     ----------
     base_colour : (4,) tuple
-        Linear Rec.709 RGB and alpha, which are multiplied by texture and vertex colour.
+        Linear Rec.709 RGB and alpha. Texture and vertex colour are further factors.
     emission : (3,) tuple
-        Radiance in cd/m2, which is multiplied by the texture.
+        Radiance in cd/m2. The texture is a further factor.
     double_sided : bool
         Whether the surface reflects and emits on both sides. Otherwise its back is black.
     metallic_roughness_texture : Texture or None

@@ -1,4 +1,4 @@
-"""Takes file locks of the operating system, which are released when the process that holds them ends."""
+"""Takes file locks of the operating system, which releases a lock when the process that holds it ends."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from baker.core.registry import names_in_source
 def scene_suffixes() -> list[str]:
     """Return the suffixes of scene files, sorted, each with its dot.
 
-    They are parsed from the source code of the importers, so that a help text imports none of them.
+    The suffixes are parsed from the source code of the importers, so that a help text imports no importer.
 
     Returns
     -------

@@ -158,7 +158,7 @@ def _trace(
 ) -> TracedTexels:
     """Run the ray stages, and return only the results that `finish_pages` reads.
 
-    All other arrays are freed, which are 1 GB for a page of 4096 texels a side.
+    All other arrays are freed. For a page of 4096 texels a side, they occupy 1 GB.
     """
     executor.open(scene, atlas, settings)
     prepared = prepare_scene(scene, atlas, settings, record)

@@ -209,8 +209,8 @@ def cast_rays(kind: str = "") -> None:
     needed = needed_shading(emitters, shading)
 
     # Compile kernels in the order in which a bake calls them: choice of emitters, shadow rays, gather. In the
-    # meantime, the bake itself compiles the kernels of all stages before direct light, and those of narrow
-    # gaps and form factors, which takes about as long.
+    # meantime, the bake itself compiles the kernels of all stages before direct light, and the kernels of
+    # narrow gaps and form factors. Both processes need about the same time.
     widest_view(emitters, origin)
     counts, every = np.zeros((2, 1, 1), np.int32), np.ones(1, bool)
     bounds = np.array([0, _TEXELS])

@@ -81,7 +81,7 @@ def _light(prepared: PreparedScene, record: Record, executor: TileExecutor) -> T
     exitance = np.zeros((texels.n, 4), np.float32)
     if prepared.settings.bounces != 0:
         exitance[:, :3] = _reflected(prepared, direct.complete, level, record, executor)
-    # Free the direct light of all entries, which is not used below.
+    # Free the direct light of all entries, because the code below does not use it.
     direct = replace(direct, complete=np.zeros((0, 3), np.float32))
     with record.stage(Stage.FINAL_GATHER):
         run = executor.runner(

@@ -2,7 +2,7 @@
 
 A duplicate face is removed only if no renderer can distinguish it from an earlier face: both faces have the
 same corners with the same attributes, and the material does not blend. Faces at the same positions with
-different attributes are kept, because renderers differ in which of them they show.
+different attributes are kept, because renderers differ in which face they show.
 """
 
 from __future__ import annotations

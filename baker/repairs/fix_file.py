@@ -185,8 +185,8 @@ def _fix(
 ) -> FixResult:
     """Fix a scene by changes that are not visible.
 
-    `data` are the bytes of the scene's GLB, which are returned if nothing is fixed. If it is None, a GLB is
-    always written. `inside_out` has, by mesh, the faces that `faces_to_flip` returns.
+    `data` are the bytes of the scene's GLB. If nothing is fixed, these bytes are returned. If `data` is None,
+    a GLB is always written. `inside_out` has, by mesh, the faces that `faces_to_flip` returns.
     """
     source, source_scene = _parsed(scene)
     area = _area_shares(source_scene)

@@ -155,7 +155,7 @@ def _choose_flips(
 
 
 def _close_holes(mesh: WeldedMesh, changes: list[Change]) -> tuple[WeldedMesh, NDArray[np.bool_]]:
-    """Close small holes. Return the new mesh, and the mask (T,) of added faces, which are the last ones."""
+    """Close small holes. Return the new mesh, and the mask (T,) of the added faces at its end."""
     n = len(mesh.triangle)
     n_open = int((count_edges(mesh.triangle) == 1).sum())
     if not n_open or (count_edges(mesh.triangle) > 2).any():

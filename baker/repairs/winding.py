@@ -1,4 +1,4 @@
-"""Finds faces of closed pieces that are wound against the rest of their piece.
+"""Finds faces whose winding disagrees with the intended front of their closed piece.
 
 A piece is a set of faces that are connected by edges. It is closed if each of its edges belongs to exactly
 two faces. The intended front of a piece is determined by the first rule that gives an answer:
@@ -59,7 +59,7 @@ def find_wrong_winding(
     normal : (T, 3) float32 or None
         Mean vertex normal of each face, zero for faces without vertex normals.
     open_too : bool
-        Whether open pieces are included, if no edge of the piece belongs to more than two faces.
+        Whether open pieces are included. Pieces with an edge of more than two faces are never included.
 
     Returns
     -------

@@ -21,7 +21,8 @@ from baker.io.temporary import TemporaryFolder, remove_abandoned
 from baker.viewer.answers import POLICY, page_answers
 from baker.viewer.script import ThreeScript
 
-# Lists the other files of an exported page. A folder is replaced only if this file lists all its files.
+# Name of the file that lists the other files of an exported page. A folder is replaced only if this list has
+# all files of the folder.
 LIST_NAME = "files.json"
 _CHARSET = '<meta charset="utf-8">'
 
@@ -38,7 +39,8 @@ def export_page(bake: StoredBake, three: ThreeScript, folder: Path) -> list[str]
     three : ThreeScript
         The files of three.js that the page loads.
     folder : Path
-        A new or empty folder, or one with an exported page, which is replaced. Its parents are created.
+        A new or empty folder, or a folder with an exported page. This page is replaced. Parents of the folder
+        are created.
 
     Returns
     -------

@@ -23,7 +23,7 @@ _ROUNDING = 1e-4
 MOST_WRONG = 0.05
 # Number of points of each other part that are tested whether they are inside the part.
 _WITNESSES = 8
-# Condition number of a transform from which an object counts as flattened.
+# Condition number of an object's transform above which the object counts as flattened.
 _FLATTENED = 1e6
 
 
@@ -135,7 +135,8 @@ def _inhabited(context: CheckContext, mesh: int, parts: _Parts, piece: int) -> b
     """
     facts = parts.facts
     corner = facts.corner[parts.faces(piece)]
-    # Test whether another closed part contains this one, and the test points of the other parts.
+    # Test whether another closed part contains this part, and whether this part contains test points of other
+    # parts.
     own = corner[:_WITNESSES, 0]
     around = (
         parts.hollow & (parts.low < own.max(axis=0)).all(axis=1) & (parts.high > own.min(axis=0)).all(axis=1)

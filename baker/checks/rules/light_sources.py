@@ -188,9 +188,10 @@ def light_intensity(context: CheckContext) -> Iterator[RawFinding]:
 def albedo(context: CheckContext) -> Iterator[RawFinding]:
     """Materials that reflect more than 95 % of the light.
 
-    No natural material does. Light decays very slowly between such surfaces, and closed rooms of them become
-    arbitrarily bright. A glTF material without a base colour is white: its albedo is 1. If an albedo exceeds
-    0.98, paths of 20 reflections measure the factor by which all reflections together multiply the light.
+    No natural material reflects as much. Light decays very slowly between such surfaces, and closed rooms
+    with such surfaces become arbitrarily bright. A glTF material without a base colour is white: its albedo
+    is 1. If an albedo exceeds 0.98, paths of 20 reflections measure the factor by which all reflections
+    together multiply the light.
     This factor is reported if it exceeds 20. A bake reports it as well.
     """
     gain = None

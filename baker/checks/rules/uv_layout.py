@@ -83,8 +83,8 @@ def out_of_range(context: CheckContext) -> Iterator[RawFinding]:
 def overlap(context: CheckContext) -> Iterator[RawFinding]:
     """Faces of one object that overlap in the lightmap uv and therefore share texels.
 
-    Both faces show the light of one of them. The percentage is the share of texels that overlap at the given
-    resolution. Up to 0.1 % is accepted as rounding. The first ten pairs of faces are listed.
+    Both faces show the light of one of the faces. The percentage is the share of texels that overlap at the
+    given resolution. Up to 0.1 % is accepted as rounding. The first ten pairs of faces are listed.
     """
     from baker.checks.kernels.uv_pairs import COVERED, COVERED_AGAIN, LISTED, OVERLAPPING, cover_pairs
 
@@ -126,7 +126,7 @@ def degenerate(context: CheckContext) -> Iterator[RawFinding]:
 
 @check("uv.flipped", group="uv", severity="warning", fix=_UNWRAP)
 def flipped(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces that are flipped in uv against the rest of their chart, because the chart is folded there."""
+    """Faces whose orientation in uv differs from most of their chart, because the chart is folded there."""
     for m, uv in laid_out(context):
         sign = np.sign(uv.signed_area)
         major = np.sign(uv.per_chart(uv.signed_area))

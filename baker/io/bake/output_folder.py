@@ -3,7 +3,7 @@
 All files are written to a temporary folder beside the output folder. At the end, the file system exchanges
 the two folders in one atomic step. In two cases the files are moved one by one instead: if the output folder
 cannot be renamed (see `baker.io.bake.mounts`), or if the file system does not support the exchange. A journal
-records these moves. If the process is killed before the last of them, `baker.io.bake.recovery` undoes them.
+records these moves. If the process is killed before the last move, `baker.io.bake.recovery` undoes the moves.
 """
 
 from __future__ import annotations

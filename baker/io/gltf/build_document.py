@@ -160,7 +160,7 @@ def material_json(packer: Packer, material: Material, images: dict[int, int], ex
     images : dict of int to int
         `id` of the pixel array to index of the embedded image; new images are added.
     extensions : set of str
-        Names of the extensions in use; those of this material are added.
+        Names of the extensions in use; the extensions of this material are added.
 
     Returns
     -------

@@ -23,7 +23,7 @@ from baker.io.mesh.scene import scene_of_meshes, to_world
 # trimesh logs errors with a traceback. Without a handler, Python would print them to stderr.
 logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
-# Name of the object: not that of the file, so that a renamed file gives the same bytes.
+# Name of the object. The name of the file is not used, so that a renamed file gives the same bytes.
 _NAME = "mesh"
 _GREY = Material(name="default", base_colour=(0.8, 0.8, 0.8, 1.0), metallic=0.0)
 
@@ -89,7 +89,7 @@ def _parse(data: bytes, kind: str) -> list[dict[str, Any]]:
     if found.get("geometry") == {} and b"facet" not in data:
         # The parser treats a truncated binary file as a text file without a solid.
         raise ValueError("it is neither text nor as long as its header says; it may be cut off")
-    # A text STL with several solids is returned as a dictionary of them.
+    # For a text STL with several solids, the parser returns a dictionary of solids.
     return list(found["geometry"].values()) if "geometry" in found else [found]
 
 
