@@ -1,4 +1,4 @@
-"""The Cornell box: two boxes in a room that is open at the front, lit by one area light.
+"""Makes the Cornell box: two boxes in a room that is open at the front, lit by one area light.
 
 Based on: Goral, Torrance, Greenberg, Battaile, Modeling the Interaction of Light Between
 Diffuse Surfaces, 1984.

@@ -1,7 +1,7 @@
-"""A hall with two rows of columns, balls and rings: 70 000 triangles, most of them in instances.
+"""Makes a hall with two rows of columns, balls and rings: 70 000 triangles, most of them in instances.
 
-It is lit by a panel, a point light, and the sun through high windows. The file contains no sky; a bake adds
-one with `--sky`.
+The hall is lit by a panel, a point light, and the sun through high windows. The file contains no sky; a bake
+adds one with `--sky`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Two rooms joined by a doorway: sun through a window in one, a ceiling panel in the other."""
+"""Makes two rooms joined by a doorway: sun through a window lights one, a ceiling panel the other."""
 
 from __future__ import annotations
 

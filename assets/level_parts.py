@@ -106,7 +106,7 @@ def house(
     foot: float = 0.0,
     holes: dict[str, tuple[float, float, float, float]] | None = None,
 ) -> None:
-    """Add a house of four walls and a flat roof that overlaps them.
+    """Add a house of four walls and a flat roof, which intersects the walls.
 
     The ends of the walls at -x and +x lie inside the other two walls.
 
@@ -140,7 +140,7 @@ def house(
 
 
 def terrain(size: float, cells: int) -> Surface:
-    """Return a square of rolling ground around the origin, whose height is given by `height`."""
+    """Return a square of rolling ground around the origin. The function `height` gives its heights."""
     flat = sheet((-size / 2, 0, -size / 2), (0, 0, size), (size, 0, 0), (cells, cells))
     x, z = flat.position[:, 0], flat.position[:, 2]
     position = np.stack([x, height(x, z), z], axis=1).round(4)
@@ -183,7 +183,7 @@ def smooth(position: NDArray[np.float64], triangle: NDArray[np.int64]) -> Surfac
 
 
 def crossed(width: float, high: float, cards: int) -> Surface:
-    """Return upright rectangles (billboards) with uv that cross in the y axis."""
+    """Return upright rectangles (billboards) that intersect each other in the y axis. They have uv."""
     parts = []
     for k in range(cards):
         c, s = round(math.cos(math.pi * k / cards), 7), round(math.sin(math.pi * k / cards), 7)

@@ -205,7 +205,7 @@ def make_warehouse() -> Level:
 
 
 def make_cellar() -> Level:
-    """A cellar with one small window below its ceiling, which opens to a light shaft."""
+    """A cellar with one small window below its ceiling. The window opens to a light shaft."""
     level = _indoors(3000.0)
     level.put("cellar floor", slab((-3.1, -2.6, -4.1), (3.1, -2.4, 4.1)), "concrete")
     level.put("ceiling", slab((-3.3, -0.1, -4.3), (3.3, 0.05, 4.3)), "plaster")

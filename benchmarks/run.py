@@ -1,4 +1,4 @@
-"""Measures `baker`: time of each stage, ray rates compared with bare Embree, memory, growth with triangles.
+"""Measures `baker`: stage times, memory, ray rates compared with bare Embree, times by triangle count.
 
     python benchmarks/run.py                     all measurements, about 20 minutes on 2 cores
     python benchmarks/run.py --quick             Cornell at 256 and 10 k triangles, under 3 minutes
@@ -24,7 +24,7 @@ from report import put_into, report
 from scenes import write_blobs
 
 ASSETS = Path(__file__).resolve().parent.parent / "assets"
-# Sky radiance of these scenes, cd/m2; the other scenes have no sky.
+# {scene: radiance of its sky, cd/m2}. All other scenes have no sky.
 SKY = {"hall": "2000,2600,3400", "interior": "2000,2600,3400"}
 
 

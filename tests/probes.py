@@ -10,7 +10,7 @@ from baker.core.lightmap import BakeResult
 
 
 class Probe:
-    """Finds the surface point nearest to a world point, in a bake in memory."""
+    """Returns lightmap values of a bake in memory at the surface points nearest to world points."""
 
     def __init__(self, result: BakeResult) -> None:
         self.result = result

@@ -1,4 +1,4 @@
-"""One new file adds an encoding with an option; flag, configuration key and settings page follow from it."""
+"""An encoding's option, added by one new file, gets a flag, a configuration key and a settings page entry."""
 
 from __future__ import annotations
 

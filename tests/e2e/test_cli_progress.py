@@ -1,4 +1,4 @@
-"""The progress of the command line: lines, bars, the time left, and the label of compilation."""
+"""The command line reports progress as lines or bars, with the time left and a label for compilation."""
 
 from __future__ import annotations
 
@@ -64,8 +64,8 @@ def test_a_bake_has_one_progress_with_the_time_left_of_all_stages():
     )  # fmt: skip
     shares = [int(re.search(r"(\d+) %", line)[1]) for line in lines]
     assert shares == [5, 10, 40, 70, 70, 85, 100]
-    # Half of the gather took 12 s, so the other half is expected to take 12 s. Finishing is expected to be as
-    # slow as loading.
+    # Half of the gather took 12 s, so the other half is expected to take 12 s. The stage `finish` is expected
+    # to take 3 s, or up to 8 times as long, because `load` took 8 times its expected second.
     assert lines[2].startswith("bake: 40 %  gather  23.1 Mrays/s  ")
     left = [float(re.search(r"(\d+) s left", line)[1]) for line in lines]
     assert 12 + 3 < left[2] <= 12 + 3 * 8

@@ -23,7 +23,7 @@ def bake(out, *, threads, seed=0):
         if path.is_file()
     }
     manifest = json.loads(files.pop("bake.json"))
-    # Only the time of the bake and its duration may differ.
+    # Only the date and the durations of the bake may differ.
     for key in ("timings", "created"):
         del manifest[key]
     return files, manifest

@@ -88,7 +88,8 @@ def test_the_fixed_file_bakes_to_the_same_picture(room, tmp_path):
     for name, n_faces in (("floor", 2), ("crate", 12)):
         assert (two.name == name).sum() == n_faces
         points, normals = one.surface_points(name, 150, rng)
-        # Points near the crate's edges are excluded: there a texel may be in shade in one layout only.
+        # Exclude points near the crate's edges, where a texel may be in shade in one bake and in light in the
+        # other.
         clear = (np.abs(points).max(axis=1) > 0.6) if name == "floor" else (np.abs(points[:, 1] - 0.5) < 0.4)
         where = points[clear], normals[clear]
         for channel in ("irradiance", "ao"):

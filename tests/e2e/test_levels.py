@@ -72,7 +72,7 @@ def test_closed_rooms_on_a_floor_that_runs_on_outside_are_dark():
         assert light(probe, away).max() < AWAY * outside, kind
         assert light(probe, beside).max() < BESIDE * outside, kind
     assert light(probe, [(2.5, 2.65, 0, UP)]) == pytest.approx(outside, rel=2e-3)
-    # Path-traced values outside, between the rooms and in front of them, standard error 0.3 %.
+    # Path-traced values outside, between the rooms and in front of the rooms, standard error 0.3 %.
     found = light(probe, [(0, 0, 0.3, UP), (-7, 0, 3.3, UP), (2.5, 1.3, 1.667, SOUTH)])[:, 1]
     assert found == pytest.approx([2199, 2679, 2830], rel=0.02)
 
@@ -141,7 +141,7 @@ def test_a_hundred_lights_add_up():
     probe = bake("warehouse", 192, 16, bounces=0)
     k = np.arange(100)
     point = np.stack([-13.5 + 3 * (k % 10), 6.0 + 0.1 * (k % 7), -18.0 + 4 * (k // 10)], axis=1)
-    # Points above the racks, from which every light is visible.
+    # Every light is visible from these points, which lie above the racks.
     places = [(-15, 3.2, z, EAST) for z in (-15.0, -3.0, 7.0)] + [(15, 4.1, z, WEST) for z in (-9.0, 2.0)]
     places += [(x, 3.4, 20, NORTH) for x in (-8.0, 0.0, 9.0)]
     truth = []

@@ -88,7 +88,7 @@ def test_a_sound_bake_passes(sound):
     assert light["texels"] == ao["texels"] == pytest.approx(400, abs=20)
     assert abs(light["bias"]) < 0.01
     assert light["median"] < 0.03
-    # Most of the median error is noise of the reference, which `noise_floor` reports.
+    # Most of the median error is noise of the path-traced reference. The figure `noise_floor` is this noise.
     assert 0.3 * light["median"] < light["noise_floor"] < light["median"] * 1.2
     assert ao["rmse"] < 0.02
     assert light["shift"] == [0, 0]
@@ -257,6 +257,6 @@ def test_a_bake_under_a_weaker_sky_is_compared_under_it(tmp_path):
     settings = make_settings({"resolution": 64, "samples": 64, "sky": "2,2,2", "sky_strength": 0.25})
     bake(scene, settings=settings, out=tmp_path / "out")
     found = verify(tmp_path / "out", VerifySettings(texels=100, spp=64, time_limit=None))
-    # Only the sky is visible from the outside of a box: E = pi L.
+    # From the outside of a box, only the sky is visible. Its radiance is L = 0.5 cd/m2, so E = pi L.
     assert found.channels["irradiance"].reference == pytest.approx(0.5 * np.pi, rel=1e-3)
     assert found.channels["irradiance"].metrics["energy_ratio"] == pytest.approx(1, abs=0.002)

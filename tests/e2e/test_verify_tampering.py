@@ -142,7 +142,7 @@ def darkest_tenth(pixels, surface):
 
 
 def below_a_thirtieth(pixels, surface):
-    # The threshold is a thirtieth of the median of the bright room.
+    # The threshold is a thirtieth of the median light of the bright room.
     light = pixels.mean(axis=2)
     on = covered(surface)
     return on & (light < np.median(light[on & (surface[1][..., 0] < 2.5)]) / 30)
@@ -247,7 +247,8 @@ def test_the_sound_bake_passes(first):
     assert found.passed, found.problems
     assert failed(found) == set()
     assert len(found.verdicts) > 40
-    # Each room is a region, and so is each light level of a room. Errors are relative to the region's light.
+    # Each room is a region. The texels of one light level of a room are a region, too. Errors are relative to
+    # the light of the region.
     rows = [row for row in found.regions if row["channel"] == "irradiance"]
     light = {row["room"]: row["light"] for row in rows if row["level"] is None}
     bright, dim = light[0], light[1]
@@ -294,7 +295,7 @@ def test_a_bake_that_went_wrong_fails(sound, first, tmp_path, monkeypatch, scene
 
 
 def forgetful(find):
-    """Return a wrapper of an emitter finder that ignores emitters of less than 1 cd/m2."""
+    """Return a wrapper of the emitter finder `find`. The wrapper leaves out emitters of less than 1 cd/m2."""
 
     def found(geometry, shading, *rest):
         emission = shading.emission.copy()

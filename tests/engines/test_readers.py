@@ -102,7 +102,7 @@ def test_openimageio_reads_the_png_files(encoded):
     code, spec = read(out / "irradiance_0.rgbm.png")
     assert (spec.nchannels, str(spec.format)) == (4, "uint8")
     top = float(spec["top"])
-    # OpenImageIO returns colours multiplied by alpha, which is the product in the formula of RGBM.
+    # OpenImageIO returns the product of colour and alpha. The formula of RGBM contains this product.
     value = top * code[:, :, :3].astype(np.float64) ** 2.2
     assert value == pytest.approx(probe_page(), rel=0.02)
     for bits in (8, 16):

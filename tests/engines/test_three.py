@@ -38,7 +38,7 @@ def test_exposure_multiplies(browser, probe):
 
 
 def test_a_room_of_known_radiosity(browser, room):
-    """In a closed room of one material the radiance, including emission, is L / (1 - albedo) everywhere."""
+    """In a closed room of one material with emission L, the radiance is L / (1 - albedo) everywhere."""
     picture = draw(browser, room / "three", camera="inside")
     assert shows_the_room(picture)
 
@@ -63,7 +63,8 @@ def test_offset_and_scale_of_an_object_are_used(browser, probe, tmp_path):
 def test_a_wrong_export_fails(browser, probe, tmp_path, right, wrong, matte):
     copy = changed(probe / "three", tmp_path / "wrong", "lightmap.js", right, wrong)
     options = json.dumps({"matte": matte})
-    # Correct pictures of standard materials differ by up to 2 %, because part of the light is specular.
+    # Correct pictures of standard materials differ from the expected colours by up to 2 %, because these
+    # materials also reflect specularly.
     rel = 0.01 if matte else 0.03
     if not matte:
         assert shows_the_probe(draw(browser, probe / "three", camera="front", options=options), rel=rel)

@@ -172,7 +172,7 @@ def test_ambient_occlusion_through_blend(alpha):
 
 
 def test_sky_through_blend_and_its_own_reflection():
-    """A room of coloured glass under a uniform sky: transmitted and reflected light.
+    """Under a uniform sky, a room of coloured glass has transmitted light and reflections of this light.
 
     From each point inside, only glass is visible. Therefore E = T * pi * L + alpha * albedo * E with
     T = (1 - alpha) * (1 - alpha * (1 - albedo)).

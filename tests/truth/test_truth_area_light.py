@@ -73,7 +73,7 @@ def test_close_up_there_is_neither_bias_nor_a_spark(height):
 
 
 def test_penumbra_from_its_first_to_its_last_hair():
-    """Depending on a texel's x, a screen hides the whole emitter, a part that is a rectangle, or nothing."""
+    """Depending on a texel's x, a screen hides the whole emitter, a rectangle of the emitter, or nothing."""
     found = []
     for seed in range(SEEDS):
         builder = SceneBuilder(64)
@@ -83,8 +83,8 @@ def test_penumbra_from_its_first_to_its_last_hair():
         found.append(floor.values(builder.bake(seed=seed, denoise=False))[..., 0])
 
     def visible(p):
-        # The edge of the screen is at x = 0, half way between floor and emitter: it hides emitter points with
-        # x < -p_x.
+        # The edge of the screen is at x = 0, half way between floor and emitter. From a floor point p, the
+        # screen hides emitter points with x < -p_x.
         edge = np.clip(-p[..., 0], -0.5, 0.5)
         corners = np.broadcast_to(square_over(1.0), (*p.shape[:-1], 4, 3)).copy()
         corners[..., [0, 3], 0] = edge[..., None]
@@ -129,7 +129,7 @@ def test_textured_emission_conserves_its_flux():
 
 
 def test_texture_lies_the_right_way_round():
-    """With one bright image corner, the wall opposite that corner of the emitter is brightest."""
+    """If one corner of the image is bright, the wall is brightest opposite that corner of the emitter."""
     image = np.zeros((8, 8, 3))
     image[0:2, 6:8] = 10.0
     builder = SceneBuilder(64)

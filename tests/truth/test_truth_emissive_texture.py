@@ -99,7 +99,8 @@ def test_the_reference_finds_a_lit_texel():
             truth = irradiance(points, panel)
             error = mean[..., panel].std(axis=1) / math.sqrt(32)
             assert (np.abs(mean[..., panel].mean(axis=1) - truth) < critical(27) * error + 1e-3 * truth).all()
-            # If a path hit a spot by chance, the estimate would be about a hundred times the truth.
+            # If a hit of a spot by chance counted fully, the estimate would be about a hundred times the
+            # truth.
             assert mean[..., panel].max() < 2.0 * truth.max()
 
 

@@ -70,7 +70,10 @@ def system():
 
 @pytest.mark.parametrize("bounces", [0, 1, 2, 3, 7])
 def test_bounces_are_terms_of_the_neumann_series(system, bounces):
-    """The solve gives the first `bounces` - 1 terms of F s + F rho F s + ...; the final gather adds one."""
+    """The solve gives the first `bounces` - 1 terms of F s + F rho F s + ...; the final gather adds one.
+
+    F are the form factors, rho is the albedo and s the exitance due to direct light.
+    """
     patches, matrix, albedo, source, full = system
     found = solve_radiosity(matrix, source, albedo, patches.area, bounces=bounces, progress=silent)
     term, total = source, np.zeros_like(source)

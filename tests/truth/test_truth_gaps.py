@@ -1,4 +1,4 @@
-"""The floor below plates 1 mm above it stays dark, although the floor around them is bright and noisy."""
+"""The floor below plates 1 mm above it stays dark, although the floor beside the plates is bright."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ UNDER = [(c, r) for c in (4, 12, 20, 28) for r in (4, 12, 20, 28)]
 def _floor_with_plates():
     """Return a builder and its floor: 2 m wide, with plates 1 mm above it; all surfaces are black.
 
-    A canopy 1 m above the floor extends from x = 0.5 to x = 20. There, a wall closes the space below it.
+    A canopy 1 m above the floor extends from x = 0.5 to x = 20. At x = 20, a wall closes the space below the
+    canopy.
     """
     builder = SceneBuilder(160)
     black = builder.material(0.0, double_sided=True)

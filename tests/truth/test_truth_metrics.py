@@ -30,8 +30,8 @@ SQUARE = np.array([[(0, 0, 0), (1, 0, 0), (1, 1, 0)], [(0, 0, 0), (1, 1, 0), (0,
 RAYS = {name: 256 if how.aim == 2 else 1024 for name, how in ESTIMATORS.items()}
 
 # {estimator: (albedo of each colour, passes of 256 x 64 paths)}. With uniform directions the variance is
-# infinite if albedo^2 > 3 / 4. `light` alone has infinite variance between walls that meet, for any albedo,
-# so it is tested in a sphere below.
+# infinite if albedo^2 > 3 / 4. The estimator `light` has infinite variance between walls that meet, for any
+# albedo, so `test_integrating_sphere` tests it.
 FURNACE = {
     "uniform": ((0.5, 0.35, 0.2), 48),
     "cosine": ((0.95, 0.8, 0.5), 140),

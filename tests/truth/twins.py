@@ -1,4 +1,4 @@
-"""Closest hits of arbitrary rays, traced in packets as kernels do, for truth tests."""
+"""Traces arbitrary rays in packets, as kernels do, and returns their closest hits to truth tests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shortcuts of rules for scenes of many objects, compared with simple implementations."""
+"""The shortcuts that checks take in scenes of many objects agree with simple implementations."""
 
 from __future__ import annotations
 

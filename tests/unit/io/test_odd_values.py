@@ -96,7 +96,8 @@ def bake_quad(folder: Path, change: Callable[[dict[str, Any]], None]) -> NDArray
     return value
 
 
-# Changes of a square that has no effect on its light: the open square receives pi lx under a sky of 1 cd/m2.
+# Changes of a square's glTF that have no effect on its light. The open square receives pi lx under a sky of 1
+# cd/m2.
 HARMLESS: dict[str, Callable[[dict[str, Any]], None]] = {
     "half of a surrogate pair in a name": lambda document: document["nodes"][0].update(name="a\ud800b"),
     "a base colour of 1e30": lambda document: document.setdefault("materials", [{}])[0].update(

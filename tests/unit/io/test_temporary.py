@@ -40,7 +40,7 @@ def test_no_temporary_folders_where_nothing_is(tmp_path: Path) -> None:
 
 
 def test_the_lock_decides_whether_a_writer_lives(tmp_path: Path) -> None:
-    """A folder without a lock is abandoned, even if its name has the number of a running process."""
+    """A folder without a lock is abandoned, even if its name contains the id of a running process."""
     out = tmp_path / "out"
     written = TemporaryFolder(out)
     written.create()

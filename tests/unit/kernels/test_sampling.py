@@ -59,7 +59,8 @@ def test_bits():
         assert int(scramble_reversed(x, seed)) == naive.owen_hash(int(x), int(seed))
     low = rng.integers(0, 2**32, 50, dtype=np.uint32)
     for k in (1, 5, 16, 31):
-        # The scrambling is nested: the lower k bits of the result depend on the lower k bits of the input.
+        # The scrambling is nested: the lower k bits of the result depend only on the lower k bits of the
+        # input.
         flipped = low ^ np.uint32(rng.integers(0, 2 ** (32 - k)) << k)
         for a, b in zip(low, flipped, strict=True):
             seed = np.uint32(12345)

@@ -1,4 +1,4 @@
-"""The lookup from a hit to a lightmap pixel, compared with a reference function in Python."""
+"""The lookup from a hit to a lightmap pixel agrees with a reference function in Python."""
 
 from __future__ import annotations
 

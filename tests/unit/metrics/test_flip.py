@@ -1,4 +1,4 @@
-"""The FLIP error of simple images."""
+"""The FLIP error of simple images has the known values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The clusters of emitters that a tile of texels samples, and their probabilities."""
+"""`EmitterChooser` chooses the clusters of emitters that a tile of texels samples, and probabilities."""
 
 from __future__ import annotations
 

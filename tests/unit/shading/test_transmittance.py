@@ -213,7 +213,10 @@ def test_fifty_cards_are_a_product_and_not_a_chance():
 
 
 def test_rays_of_all_directions_are_asked_once_at_each_crossing():
-    """Compare with a loop over all triangles. Coherent packets would call the filter once per octant."""
+    """Compare with a loop over all triangles.
+
+    With Embree's coherent flag, the filter would be called once for each octant of ray directions.
+    """
     rng = np.random.default_rng(7)
     corner = rng.uniform(-1, 1, (300, 1, 3)) + rng.uniform(-0.5, 0.5, (300, 3, 3))
     world = mesh_scene((corner.reshape(-1, 3), np.arange(900).reshape(-1, 3)))

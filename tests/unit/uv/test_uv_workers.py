@@ -21,7 +21,7 @@ def jobs() -> list[ChartJob]:
 
 @pytest.fixture
 def lose(monkeypatch: pytest.MonkeyPatch):
-    """Return a function: the next `times` workers that get a job are ended by a signal."""
+    """Return a function after whose call a signal kills the next `times` workers that get a job."""
 
     def lose(number: int, times: int) -> list[int]:
         ended: list[int] = []

@@ -170,7 +170,7 @@ def ball_mesh(subdivisions: int) -> Mesh:
 
 
 def welded(mesh):
-    """Return vertices welded by position, and triangles of them."""
+    """Return the distinct positions of a mesh's vertices, and its triangles as indices of these positions."""
     label = weld(mesh.position)
     place = np.zeros((label.max() + 1, 3))
     place[label] = mesh.position

@@ -131,7 +131,8 @@ def test_an_unknown_model_without_a_base_colour_reflects_half(tmp_path, name):
         assert len(found) == 1
         assert found[0].object == "odd"
         assert name in found[0].message
-    # If the core material has a base colour, that colour is the author's fallback for the extension.
+    # If the core material has a base colour, that colour is the author's fallback for readers without the
+    # extension.
     material, found = load(pbrMetallicRoughness={"baseColorFactor": [0.1, 0.2, 0.3, 1]})
     assert (material.base_colour, found) == ((0.1, 0.2, 0.3, 1), [])
 
