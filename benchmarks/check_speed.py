@@ -1,7 +1,7 @@
 """Measures `baker check` on a mesh of a million triangles with lightmap uv, and on a hundred kit pieces.
 
-python benchmarks/check_speed.py            both cases, each as one process, after a process that warms up
-python benchmarks/check_speed.py --profile  time of each check on the million triangles
+python benchmarks/check_speed.py both cases, each in one process, after a run that is not measured python
+benchmarks/check_speed.py --profile time of each check on the million triangles
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Writes a closed room with bumpy blobs, which has the same shape for any number of triangles.
+"""Writes a closed room with bumpy blobs. Its shape is the same for any number of triangles.
 
 The bumps are much larger than the triangles of the coarsest version, so all versions look alike. The scene
 has lightmap uv, so that a bake measures rays and not the unwrap.
@@ -85,8 +85,8 @@ def _face(axis: int, sign: float, side: int, centre: tuple[float, float, float],
     bump = np.sin(5 * x + phase) * np.sin(4 * y - phase) + 0.5 * np.sin(7 * z + 2 * x + phase)
     radius = 0.9 + BUMP * bump
     position = direction * radius[..., None]
-    # Compute the normal of the surface r = R(d), which is d - grad R / R with the gradient on the unit
-    # sphere.
+    # Compute the normal of the surface r = R(d), where d is a direction. It is d - grad R / R, with the
+    # gradient on the unit sphere.
     gradient = np.stack(
         [
             5 * np.cos(5 * x + phase) * np.sin(4 * y - phase) + np.cos(7 * z + 2 * x + phase),

@@ -1,4 +1,4 @@
-"""Closed forms of irradiance and ambient occlusion with which tests compare bakes."""
+"""Computes closed forms of irradiance and ambient occlusion, with which tests compare bakes."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def held(path: Path, *, shared: bool = False) -> Iterator[None]:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Any:
-    """Run a timed test while no other process runs a test, and all other tests in parallel."""
+    """Run a timed test alone, while no other process runs a test. Run all other tests in parallel."""
     folder = item.config.stash.get(_LOCKS, None)
     if folder is None:
         return (yield)

@@ -1,4 +1,4 @@
-"""Scenes for tests of writers: a glTF that uses many features, and atlases and bakes made without rays."""
+"""Makes scenes for tests of writers: a glTF with many features, and atlases and bakes made without rays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenes that together use all features of the path tracer, small enough for many passes."""
+"""Makes scenes that together use all features of the path tracer, and are small enough for many passes."""
 
 from __future__ import annotations
 

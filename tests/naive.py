@@ -1,4 +1,4 @@
-"""Slow, simple implementations of kernels, and statistical tests of samplers."""
+"""Implements kernels in slow, simple ways for comparison, and statistical tests of samplers."""
 
 from __future__ import annotations
 

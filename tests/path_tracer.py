@@ -1,7 +1,7 @@
-"""A simple NumPy path tracer on embreex, independent of the bake's code, with which bakes are compared.
+"""A simple NumPy path tracer on embreex, which shares no code with bakes. Tests compare bakes with it.
 
-It computes irradiance at points, with light sampling of emissive triangles at every vertex of a path,
-cosine-weighted bounces and Russian roulette. Surfaces are Lambertian without textures, one-sided or
+The path tracer computes irradiance at points, with light sampling of emissive triangles at every vertex of a
+path, cosine-weighted bounces and Russian roulette. Surfaces are Lambertian without textures, one-sided or
 double-sided.
 """
 

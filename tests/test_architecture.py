@@ -162,7 +162,7 @@ def test_pillow_has_one_reader_and_one_writer():
 
 def test_numba_lives_low():
     homes = {path.parent.name for path in sources(*PACKAGES) if "numba" in imported(path)}
-    # The path tracer has separate kernels, because bakes are compared with it.
+    # The path tracer has separate kernels, because it is the reference with which bakes are compared.
     assert homes <= {"kernels", "lights", "trace", "pathtracer"}
 
 

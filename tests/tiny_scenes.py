@@ -1,4 +1,4 @@
-"""Scenes of a few rectangles with known lightmap uv, for tests that run single stages of a bake."""
+"""Makes scenes of a few rectangles with known lightmap uv, for tests that run single stages of a bake."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def joined(scene, order=slice(None)):
 
 
 def quad_atlas(scene, size, inset=0.0):
-    """Return an atlas with a cell of a square grid for each quad, `inset` texels inside the cell."""
+    """Return an atlas in which each quad fills a cell of a square grid, up to a border of `inset` texels."""
     side = int(np.ceil(np.sqrt(len(scene.instances))))
     cell = size // side
     layouts = []

@@ -1,4 +1,4 @@
-"""A bake made without rays, in which every texel, pixel and click has a known value.
+"""Makes a bake without tracing rays, in which every texel, pixel and click has a known value.
 
 A camera at z = 5 looks at the plane z = 0; the picture is 4 m high there. On the left is a square with a base
 colour texture, on page 0. On the right is a square without texture, on page 1 with transposed uv. In front of

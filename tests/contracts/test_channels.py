@@ -54,7 +54,7 @@ def transport():
 
 
 def needed(channel, transport):
-    """Return the `Transport` without the results that the channel does not declare as needed."""
+    """Return the `Transport` with only those results that the channel declares as needed."""
     return Transport(
         direct=transport.direct if channel.needs_light else None,
         gathered=transport.gathered if channel.needs_light else None,

@@ -77,7 +77,8 @@ def test_sky_alone(tmp_path):
     post = box_quads((0.4, 0, 0.4), (0.6, 0.5, 0.6), inward=False)
     found = verify(baked(tmp_path / "out", quad_scene([floor, *post]), sky="2,1,0.5"), QUICK)
     assert found.passed
-    # Without the post, E would be pi L.
+    # The red radiance of the sky is L = 2 cd/m2. Far from the post, which hides a part of the sky, E is
+    # nearly pi L.
     assert found.channels["irradiance"].reference[:, 0].max() == pytest.approx(2 * np.pi, rel=0.1)
 
 

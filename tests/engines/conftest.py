@@ -1,4 +1,4 @@
-"""The fixture of the browser that all engine tests share."""
+"""Starts the browser that all engine tests share, as a fixture."""
 
 from __future__ import annotations
 

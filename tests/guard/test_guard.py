@@ -1,4 +1,4 @@
-"""Comparison of records and description of differences, without running `baker`."""
+"""Records of the guard are compared and their differences described, without running `baker`."""
 
 from __future__ import annotations
 

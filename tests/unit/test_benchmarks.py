@@ -1,4 +1,4 @@
-"""Benchmarks: geometry of the blob room, figures in the tables, and measured rates of a tiny bake."""
+"""The benchmarks' blob room, the figures in their tables and the rates of a tiny bake are correct."""
 
 import importlib.util
 import json

@@ -1,4 +1,4 @@
-"""The Python API: names, settings, results, errors and docs."""
+"""The Python API has the documented names, settings, results, errors and docs."""
 
 from __future__ import annotations
 

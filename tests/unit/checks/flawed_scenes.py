@@ -26,7 +26,7 @@ SQUARE = np.float32([[0, 0], [1, 0], [1, 1], [0, 1]])
 
 @dataclass(frozen=True)
 class Case:
-    """A GLB with a flaw, a GLB without the flaw, and the bake settings with which both are checked."""
+    """A GLB with a flaw, a GLB without the flaw, and the bake settings for the check of both."""
 
     bad: bytes
     good: bytes
@@ -130,7 +130,7 @@ def painted(grey: float) -> bytes:
 
 
 def dimmed(level: float) -> bytes:
-    """Return a GLB of a square of a grey material whose vertex colours have the given level."""
+    """Return a GLB of a square with a grey material. Its vertex colours have the given level."""
     return scene(quad(COLOR_0=np.full((4, 3), level, np.float32)))
 
 
@@ -194,7 +194,7 @@ def _box_of(n: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _fold() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return vertices, triangles and uv of a 2 x 2 grid. In uv the middle vertex lies outside the border."""
+    """Return vertices, triangles and uv of a 2 x 2 grid. In uv, the middle vertex lies outside the grid."""
     place, triangle = _grid(2)
     uv = np.float32(place[:, :2] * 0.8 + 0.1)
     uv[4] = (0.95, 0.95)

@@ -27,7 +27,7 @@ PARTS = [
     (CUBE[:3] + np.float32([0, 0, 4]), [[0, 1, 2], [2, 0, 1]]),
 ]
 # Codes that are not compared. Their counts depend on how the file divides geometry into meshes and vertices,
-# or they are reported once for the scene.
+# or they are reported only once per scene.
 UNLIKE = {"cost", "duplicate-vertices", "missing-normals", "no-light", "uv.missing", "no-triangles"}
 
 

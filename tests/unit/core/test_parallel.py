@@ -1,4 +1,4 @@
-"""`run_tiles` processes each item once, passes on errors and cancelling, and leaves no thread running."""
+"""`run_tiles` processes each item once, raises the error of a tile, can be cancelled, and ends threads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Synthetic pages of polygonal charts with analytic light, and slow reference functions for page kernels."""
+"""Makes pages of polygonal charts with analytic light, and computes slowly what page kernels compute."""
 
 from __future__ import annotations
 

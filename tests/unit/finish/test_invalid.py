@@ -1,4 +1,4 @@
-"""`fill_invalid` on small pages, compared with plain loops over rings of neighbours."""
+"""`fill_invalid` gives the same values on small pages as plain loops over rings of neighbours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`recentre` and `dilate`, compared with dense least squares, plain loops and the known light of a page."""
+"""`recentre` and `dilate` agree with dense least squares, plain loops and the known light of a page."""
 
 from __future__ import annotations
 

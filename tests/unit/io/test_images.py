@@ -1,4 +1,4 @@
-"""Image files are decoded in strips of rows, and images above `LARGEST_IMAGE_SIDE` are averaged."""
+"""Images are decoded in strips of rows, and images above `LARGEST_IMAGE_SIDE` are reduced by averaging."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""JOBS.toml: keys, errors, and the files that a pattern matches."""
+"""JOBS.toml: jobs are merged with defaults, mistakes are refused, and patterns are expanded to files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Triangles clipped to texel squares, compared with polygons that are assembled from candidate corners."""
+"""Triangles clipped to texel squares equal polygons that `naive.cut_polygon` finds from candidate corners."""
 
 from __future__ import annotations
 
@@ -87,7 +87,8 @@ def test_a_triangle_without_area_touches_along_its_line_only():
     line = np.array([[0.5, 0.5], [3.5, 3.5], [2.0, 2.0]])
     for turn in (line, line[::-1], line[[1, 2, 0]]):
         touched = {(x, y) for x in range(4) for y in range(4) if square_touches(turn, x, y)}
-        # The line passes through corners of squares, so it also touches the two squares beside each corner.
+        # The line passes through corners that four squares share. At each such corner, it also touches the
+        # two squares beside the line.
         assert touched == {(x, y) for x in range(4) for y in range(4) if abs(x - y) <= 1}
     assert square_touches(np.full((3, 2), 0.3), 0, 0) == 1
 

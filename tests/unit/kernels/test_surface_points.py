@@ -123,7 +123,8 @@ def test_points_are_uniform_in_what_is_covered(slanted):
                 [naive.cut_area(corner, x0 + a / 5, y0 + b / 5, 0.2) for b in range(5)] for a in range(5)
             ]
         assert area.sum() == pytest.approx(coverage[i], abs=1e-5)
-        # By rounding, a few points may lie just inside an empty cell. They are left out.
+        # By rounding, up to two points may lie just inside an empty cell. The chi-square test leaves out such
+        # cells.
         assert table[area < 1e-7].sum() <= 2
         table[area < 1e-7], area[area < 1e-7] = 0, 0
         chance.append(naive.chi_square_chance(table, area / area.sum() * table.sum()))

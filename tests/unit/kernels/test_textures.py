@@ -1,4 +1,4 @@
-"""Texture lookups and the albedo of texels, compared with Python loops over pixels."""
+"""Texture lookups and the albedo of texels agree with Python loops over pixels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Means of textures over uv triangles, compared with clipping the triangle to each texel."""
+"""`uv_means` gives the same means of textures over uv triangles as clipping the triangle to each texel."""
 
 from __future__ import annotations
 

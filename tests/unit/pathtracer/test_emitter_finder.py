@@ -1,4 +1,4 @@
-"""The path tracer's emitter table, compared with closed forms and with the emitter table of the bake."""
+"""The path tracer's emitter table agrees with closed forms and with the emitter table of the bake."""
 
 from __future__ import annotations
 

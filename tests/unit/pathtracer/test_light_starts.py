@@ -1,4 +1,4 @@
-"""Start of light subpaths and choice of lights: samples match densities, mean flux matches total power."""
+"""Starts of light subpaths and chosen lights match their densities, and mean flux matches total power."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`find_inside_geometry` finds the points of a floor that are in a one-sided or double-sided crate."""
+"""`find_inside_geometry` finds the floor's points that are inside of a one-sided or double-sided crate."""
 
 from __future__ import annotations
 

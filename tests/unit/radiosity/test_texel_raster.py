@@ -1,4 +1,4 @@
-"""Lists of the triangles that overlap each texel, compared with loops over texels and triangles."""
+"""The lists of triangles that overlap each texel agree with loops over texels and triangles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shapes and glTF files with known defects, for the tests of fixes and repairs."""
+"""Makes shapes and glTF files with known defects, for the tests of fixes and repairs."""
 
 from __future__ import annotations
 

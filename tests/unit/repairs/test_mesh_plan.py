@@ -131,7 +131,7 @@ def test_the_back_of_a_double_sided_face_goes_only_if_it_shows_the_same():
         "duplicate-faces": (2, 1)
     }
     assert "duplicate-faces" not in changes(fix_one(part(both, triangle, same, double_sided=True))[0])
-    # If the material is one-sided, a face and its back are both visible.
+    # If the material is one-sided, both faces are visible, each from its side. Therefore neither is removed.
     plan, made = fix_one(part(both, triangle, opposite))
     assert made is None
     assert not plan.left

@@ -1,4 +1,4 @@
-"""Repairs of shapes: repaired and remaining defects, distance of the surfaces, import of pymeshlab."""
+"""`fix_file` repairs shapes and reports remaining defects and the distance between old and new surface."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which surfaces colour light that passes through, and the factor of each crossing."""
+"""Coloured BLEND surfaces multiply the light that passes through them by one factor for each crossing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Slivers are triangles whose height is less than 1/50 of their longest side."""
+"""Slivers are triangles whose height over their longest side is less than 1/50 of this side."""
 
 from __future__ import annotations
 

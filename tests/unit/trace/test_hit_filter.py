@@ -1,4 +1,4 @@
-"""Rays ignore hits that a hit filter rejects, and report the index of a triangle in the scene."""
+"""Rays ignore hits that a hit filter rejects. A reported hit has the index of its triangle in the scene."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ray packets, compared with queries of embreex and with a loop over all triangles."""
+"""Ray packets give the same hits as queries of embreex and as a loop over all triangles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Steps of the unwrap: overlap counts, outlines, packing, planar charts, parts, worker processes."""
+"""Single steps of the unwrap are tested: overlap counts, outlines, packing, planar charts, parts, workers."""
 
 from __future__ import annotations
 

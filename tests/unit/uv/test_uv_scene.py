@@ -1,4 +1,4 @@
-"""Atlases of whole scenes: the guarantees of `Atlas`, density, padding, stretch and determinism."""
+"""Atlases of whole scenes keep the guarantees of `Atlas` for density, padding, stretch and determinism."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Small meshes and scenes for the tests of the unwrap."""
+"""Makes small meshes and scenes for the tests of the unwrap."""
 
 from __future__ import annotations
 

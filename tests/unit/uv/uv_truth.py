@@ -1,4 +1,4 @@
-"""Slow reference functions for an atlas: covered texels, gaps between charts, stretch."""
+"""Computes covered texels, gaps between charts and stretch of an atlas with slow, simple functions."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ def server() -> Iterator[ViewServer]:
 
 
 def answer(server: ViewServer, request: bytes) -> bytes:
-    """Return everything that the server sends for the bytes `request`, which may have several requests."""
+    """Return everything that the server sends for the bytes `request`, which may contain several requests."""
     host = f"127.0.0.1:{server.server_port}".encode()
     with socket.create_connection(("127.0.0.1", server.server_port), timeout=10) as line:
         line.sendall(request.replace(b"%s", host))
@@ -66,7 +66,7 @@ def answer(server: ViewServer, request: bytes) -> bytes:
 @pytest.mark.parametrize("name", REFUSED)
 def test_an_ambiguous_request_is_refused(server: ViewServer, name: str) -> None:
     found = answer(server, REFUSED[name] + NEXT)
-    # An answer in HTTP/0.9 has no status.
+    # An answer in HTTP/0.9 has no status line.
     assert b" 400 " in found.splitlines()[0] or b"Error code: 400" in found or name == "no version"
     assert b"page" not in found
     assert b"secret" not in found, "what follows is not read"

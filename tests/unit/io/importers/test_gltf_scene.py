@@ -1,4 +1,4 @@
-"""The glTF importer: nodes, instances, lights, scenes, warnings and errors."""
+"""The glTF importer reads nodes, instances, lights and scenes, with correct warnings and errors."""
 
 from __future__ import annotations
 

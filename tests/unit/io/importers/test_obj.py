@@ -1,4 +1,4 @@
-"""The importer of OBJ and MTL files: geometry, relative indices, materials and errors."""
+"""The importer of OBJ and MTL files reads geometry, relative indices and materials, and refuses errors."""
 
 from __future__ import annotations
 
