@@ -20,7 +20,8 @@ UV = QUAD[:, :2].copy()
 def context(tmp_path, uv, texel=(10, 40), scale=(1.0, 1.0, 1.0)):
     """Return the context of a scene of two unit squares that face each other at a distance of one metre.
 
-    One square emits. Its emissive texture has 64 x 64 texels, of which one is white and the others black.
+    One square emits. Its emissive texture has 64 x 64 texels. One of these texels is white, all others are
+    black.
     """
     image = np.zeros((64, 64, 3), np.uint8)
     image[texel] = 255

@@ -136,7 +136,7 @@ def test_a_renamed_node_is_known_by_its_mesh():
 
 
 def test_maps_of_different_layout_read_the_same_where_light_is_linear_in_the_place():
-    """Bilinear lookup reproduces linear light up to rounding errors of single precision."""
+    """If light is a linear function of position, bilinear lookup reproduces it up to float32 rounding."""
     scene = quad_scene([FLOOR])
     stored, points = [], None
     for size, inset in ((32, 2.0), (57, 5.5)):

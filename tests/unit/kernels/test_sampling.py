@@ -28,7 +28,7 @@ texel_scramble, triangle_barycentric = compiled(texel_scramble, triangle_barycen
 
 
 def cosine_directions(points):
-    """Return `cosine_direction` of (n, 2) points of the unit square as (n, 3) float32."""
+    """Return the `cosine_direction` (n, 3) float32 of each of n points (n, 2) of the unit square."""
     return np.array([cosine_direction(u, v) for u, v in points], np.float32).reshape(-1, 3)
 
 

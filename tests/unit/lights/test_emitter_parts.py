@@ -51,7 +51,7 @@ def blobs(n=48):
 
 
 def plate(material, far=0.0):
-    """Return the world of an emitting plate of 2 x 1 m that faces down, and of a quad at x = `far`."""
+    """Return the world of an emitting plate of 2 x 1 m that faces down and of a grey quad at x = `far`."""
     quads = [Quad((0, 1, 0), (2, 0, 0), (0, 0, 1), material)]
     return quad_world([*quads, Quad((far, -3, 0), (1, 0, 0), (0, 0, -1), grey(0.5))])
 

@@ -1,4 +1,4 @@
-"""`parse_limits` and `evaluate_limits`: limits at, above and below a figure, and texts that are refused."""
+"""Limits at, above and below a figure are evaluated correctly, and invalid texts of limits are refused."""
 
 from __future__ import annotations
 

@@ -167,7 +167,7 @@ def test_directions_follow_the_cosine_whatever_the_normal():
 
 
 def frame(rows, normal):
-    """Write the normals (8, 3) and their tangent frames to block 0."""
+    """Write the normals (8, 3) of the eight lanes and their tangent frames to the rows of block 0."""
     from baker.kernels.sampling import tangent_frame
 
     rows[0, NORMAL : NORMAL + 3] = rows[0, SHADED : SHADED + 3] = normal.T

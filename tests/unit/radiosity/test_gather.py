@@ -47,7 +47,7 @@ def room():
 
 @pytest.fixture(scope="module")
 def rays_of(room):
-    """Return the inputs of `gather` for 23 texels and its result, computed ray by ray in Python."""
+    """Return the inputs of `gather` for 23 texels, and the result computed ray by ray in Python."""
     n_samples, n_light = 64, 23
     net, shared = sobol_reversed(n_samples, 0, 6), shared_bits_mask(n_samples)
     # The tile does not begin at texel 0, and its 23 texels are not a multiple of the packet width.

@@ -197,7 +197,7 @@ def test_a_gradient_is_looked_up_where_each_ray_passes():
 
 
 def test_a_pane_seen_edge_on_is_crossed_by_nothing():
-    """Rays are parallel to a pane, 0.1 mm above it."""
+    """Rays parallel to a pane, 0.1 mm above it, do not cross the pane."""
     origin = np.column_stack([np.full(50, -1.0), np.linspace(0.1, 0.9, 50), np.full(50, 1e-4)])
     along = np.tile([1.0, 0, 0], (50, 1))
     assert (visible(shaded([pane()]), origin, along) == 1).all()
@@ -237,7 +237,10 @@ def test_rays_of_all_directions_are_asked_once_at_each_crossing():
 
 
 def test_a_sphere_is_left_once_and_crossed_twice():
-    """Rays through the vertices and edge midpoints of a sphere, from its centre and from outside."""
+    """Rays from the centre of a sphere cross it once, rays from outside cross it twice.
+
+    The rays pass through vertices and edge midpoints.
+    """
     corner = icosphere(2)
     world = mesh_scene((corner.reshape(-1, 3), np.arange(3 * len(corner)).reshape(-1, 3)))
     aim = np.concatenate([corner.reshape(-1, 3), 0.5 * (corner + np.roll(corner, 1, axis=1)).reshape(-1, 3)])

@@ -44,7 +44,10 @@ def tree(quads):
 
 @kernel
 def _cast(buffers, origin, direction, far, any_hit, end, kept):
-    """Trace n rays in packets of 16. Write their ends to `end` (n,) and colour factors to `kept` (n, 3)."""
+    """Trace n rays in packets of 16.
+
+    Write the distance at which each ray ends to `end` (n,), and its colour factor to `kept` (n, 3).
+    """
     on, rays, words, width = buffers.lane_valid, buffers.lane_floats, buffers.lane_words, buffers.width
     function = buffers.occluded if any_hit else buffers.intersect
     for group in range(0, len(origin), PACKET_WIDTH):
@@ -75,7 +78,11 @@ def _cast(buffers, origin, direction, far, any_hit, end, kept):
 
 
 def cast(rays, n=500, far=100.0, any_hit=False):
-    """Trace rays down from z = 5. Return x and y (m, 2), end (m,), colour factor (m, 3) of m traced rays."""
+    """Trace rays down from z = 5.
+
+    Return, for the m rays that were traced, x and y (m, 2), the distance to the end (m,), and the colour
+    factor (m, 3).
+    """
     rng = np.random.default_rng(0)
     origin = np.float32(np.column_stack([rng.uniform(0.01, 0.99, (n, 2)), np.full(n, 5.0)]))
     end, kept = np.zeros(n, np.float32), np.zeros((n, 3), np.float32)

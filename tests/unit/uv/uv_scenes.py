@@ -85,7 +85,7 @@ def torus_mesh(major: int = 48, minor: int = 24) -> Mesh:
 
 
 def bent_mesh() -> Mesh:
-    """Return a strip along a half circle of radius 1, which can be unrolled without stretch."""
+    """Return a strip along a half circle of radius 1. The strip can be unrolled without stretch."""
     return grid_mesh(24, 4, lambda s, t: (np.cos(np.pi * s), np.sin(np.pi * s), t), "strip")
 
 

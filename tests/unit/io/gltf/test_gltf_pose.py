@@ -1,4 +1,4 @@
-"""World positions of skinned meshes and of `EXT_mesh_gpu_instancing` instances, and hidden nodes."""
+"""Skinned meshes and `EXT_mesh_gpu_instancing` get correct world positions; hidden nodes are left out."""
 
 from __future__ import annotations
 
