@@ -2,8 +2,8 @@
 
 A rule is a function that finds one kind of defect: it takes a `CheckContext` and yields `RawFinding` objects.
 The code of a rule is its name in reports, such as `zero-area-faces`. A rule is decorated with `check` and
-defined in a file of `baker/checks/rules/`. Its docstring is its section of docs/CHECKS.md: the first line
-names the defect, and the rest describes the effect of the defect and the test for it.
+defined in a file of `baker/checks/rules/`. The docstring of a rule is its section of docs/CHECKS.md: the
+first line names the defect, and the other lines describe the effect of the defect and the test for it.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class Check:
         The rule itself.
     in_bake : bool
         Whether docs/CHECKS.md marks the rule with "in a bake". These are the rules that
-        `baker.checks.in_bake` runs in every bake. `light-range`, which it runs only in bakes of light, is
-        not marked.
+        `baker.checks.in_bake` runs in every bake. The rule `light-range` is not marked,
+        because `in_bake` runs it only in bakes of light.
     """
 
     code: str

@@ -90,7 +90,7 @@ def check_scene(
     scene : Scene, Path or str
         A scene, or the path of a scene file. A file is read leniently: most defects become findings.
     settings : CheckSettings
-        Settings of the check. Those in the scene's extras are added.
+        Settings of the check. The settings in the scene's extras are added.
     bake_settings : BakeSettings
         Settings of the bake that the scene is checked for: resolution, padding, uv, sky and others.
     progress : Progress

@@ -36,7 +36,8 @@ def trapped_gain(context: CheckContext, albedo: NDArray[np.float64]) -> float:
     Returns
     -------
     float
-        1 if the scene has no surface, or if light is trapped nowhere.
+        Factor by which all reflections together multiply the light. It is 1 if the scene has no surface, or
+        if light is trapped nowhere.
     """
     world = context.world
     if not world.area.sum() > 0:

@@ -42,8 +42,8 @@ class WorldTriangles:
     position : (V, 3) float32, metres, world, relative to `origin`
         Vertices of all instances.
     triangle : (T, 3) int64
-        Indices into `position`, counter-clockwise seen from the front. Under a mirroring node they are in the
-        reverse of the mesh's order.
+        Indices into `position`, counter-clockwise seen from the front. If a node mirrors its mesh,
+        the corners are in reverse order compared with the mesh.
     instance : (T,) int64
         Index of the triangle's instance in `instances`.
     face : (T,) int64
@@ -157,7 +157,7 @@ def cast(
     near: NDArray[np.floating],
     far: NDArray[np.floating],
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Trace n rays with any tracer. The results are those of `WorldTriangles.first_hits`."""
+    """Trace n rays with a tracer; return triangles and distances as `WorldTriangles.first_hits` does."""
     from baker.core.parallel import run_tiles
     from baker.core.progress import silent
     from baker.kernels.cast import first_hits

@@ -15,7 +15,8 @@ from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
 
 # Patches are the blocks of texels that radiosity treats as one surface element. This is the largest number of
-# patches outside narrow gaps, and also the largest number inside them. Beyond it, patches are larger blocks.
+# patches outside narrow gaps, and also the largest number inside them. Blocks are enlarged until the numbers
+# are within this limit.
 MAX_PATCHES = 32768
 # Smallest and largest number of rays from each patch for its form factors. Between these limits, the number
 # equals the hemisphere rays per texel.
@@ -23,7 +24,7 @@ MIN_PATCH_RAYS, MAX_PATCH_RAYS = 128, 512
 
 # Share of the texels of a page that charts cover: without the setting `density`, and with it. In this
 # project's scenes at 512 and 1024 texels a side, the share was 0.67 to 0.83 without `density` and 0.55 to
-# 0.69 with it. It is lower with `density`, because each instance must fit on one page at this scale.
+# 0.69 with it. With `density` it is lower, because instances have a fixed scale and each must fit on a page.
 FILLED, FILLED_AT_DENSITY = 0.8, 0.65
 # Rays per texel that do not depend on settings: to find points inside geometry, to each light without area,
 # and to nearby emitters.
@@ -46,9 +47,10 @@ MAX_CACHED_TEXELS, CACHED_BYTES_PER_TEXEL = 262_144, 384
 # ambient occlusion only, then for bakes with light.
 AO_RAY_BYTES_PER_TEXEL, AO_FINISH_BYTES_PER_TEXEL = 150, 230
 LIGHT_RAY_BYTES_PER_TEXEL, LIGHT_FINISH_BYTES_PER_TEXEL = 200, 380
-# Bytes for each ray of each patch: its form factor, the reciprocal form factor and the merged one.
+# Bytes for each ray from each patch: form factor, reciprocal form factor, and the merged form factor.
 BYTES_PER_PATCH_RAY = 28
-# Bytes of Open Image Denoise per pixel of one page, and its largest total: larger pages are split into tiles.
+# Memory of Open Image Denoise for each pixel of a page, and its largest memory, bytes. Pages that would need
+# more memory are split into tiles.
 DENOISE_BYTES_PER_PIXEL, MAX_DENOISE_BYTES = 520, 650 * MIB
 # Estimated number of additional small patches where charts end, normals change or gaps are narrow: per
 # triangle, and the largest total.

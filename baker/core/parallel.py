@@ -45,7 +45,7 @@ Part = tuple[Any, ...]
 
 
 class TileRunner(Protocol):
-    """Runs all tiles of a stage, in this process (`run_tiles`) or in others."""
+    """Runs all tiles of a stage, in this process (`run_tiles`) or in other processes."""
 
     def __call__(
         self,

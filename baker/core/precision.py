@@ -1,8 +1,8 @@
 """Finds objects whose positions in float32 are too inaccurate for the size of their texels.
 
 Two kinds of coordinates are float32. Files store vertices in object space. 100 km from the object's origin,
-float32 numbers are spaced by 8 mm, and no transform of the node changes this. A bake traces positions
-relative to the scene's origin. 100 km from that origin, they have the same spacing.
+float32 numbers are spaced by 8 mm, and no transform of the node makes this spacing finer. A bake traces
+positions relative to the scene's origin. 100 km from that origin, they are spaced by 8 mm as well.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ def coarse_warnings(scene: Scene, atlas: Atlas) -> list[SceneWarning]:
     scene : Scene
         The baked scene.
     atlas : Atlas
-        Its atlas; the texels per metre of each instance are read.
+        The atlas of the scene; the texels per metre of each instance are read.
 
     Returns
     -------

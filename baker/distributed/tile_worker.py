@@ -48,7 +48,7 @@ class TileWorker:
     scene : Scene
         The baked scene.
     atlas : Atlas
-        Its lightmap uv.
+        The lightmap uv of the scene.
     settings : BakeSettings
         The settings of the bake.
     """

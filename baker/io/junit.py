@@ -82,7 +82,7 @@ def write_text(path: Path, text: str) -> None:
     path : Path
         The file; its parents are created.
     text : str
-        Its content.
+        The content of the file.
 
     Raises
     ------

@@ -196,7 +196,7 @@ def read_scene_file(path: Path) -> bytes:
     Returns
     -------
     bytes
-        Its content.
+        The content of the file.
 
     Raises
     ------

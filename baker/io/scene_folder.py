@@ -15,7 +15,7 @@ from baker.io.regular_file import LARGEST, LARGEST_PART, read_regular
 
 
 class OutsideError(InputError):
-    """A scene refers to a file outside its folder. It is raised even if a bake does not need the file."""
+    """Raised if a scene refers to a file outside its folder, even if a bake does not need the file."""
 
 
 class OutsideName(Exception):  # noqa: N818 - a reason, which becomes an OutsideError with file and object

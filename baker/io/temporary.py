@@ -221,7 +221,7 @@ def write_atomically(path: Path, data: bytes, what: str) -> None:
     path : Path
         The file; its parents are created.
     data : bytes
-        Its content.
+        The content of the file.
     what : str
         Kind of file, for the error message: "picture".
     """

@@ -64,7 +64,7 @@ def finish_pages(
     scene : Scene
         The baked scene.
     atlas : Atlas
-        Its lightmap uv.
+        The lightmap uv of the scene.
     traced : TracedTexels
         Texels and their values.
     channels : mapping of str to Channel

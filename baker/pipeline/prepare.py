@@ -94,7 +94,7 @@ def prepare_scene(
     scene : Scene
         The scene to bake.
     atlas : Atlas
-        Its lightmap uv.
+        The lightmap uv of the scene.
     settings : BakeSettings
         Settings of the bake.
     record : Record

@@ -99,7 +99,7 @@ def _exact_duplicates(primitive: EditablePrimitive, triangle: NDArray[np.int64])
     """Return (T,) bool: the faces (T, 3) that are rendered exactly like an earlier face.
 
     A face with the same corners but opposite winding is equal only if the material is double-sided and the
-    normals are opposite. It is then the back of the earlier face.
+    normals are opposite. The face is then the back of the earlier face.
     """
     leave_out = {"NORMAL"} if primitive.reads_lightmap_uv else {"NORMAL", "TEXCOORD_1"}
     column = [data for name, data in primitive.column.items() if name not in leave_out]

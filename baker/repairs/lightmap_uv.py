@@ -59,7 +59,7 @@ def new_lightmap_uv(
     plan : MeshPlan
         The edits of the mesh.
     shown : sequence of SourceInstance
-        The instances of the mesh. It is unwrapped at the scale of the first instance.
+        The instances of the mesh. The mesh is unwrapped at the scale of the first instance.
     request : UvRequest
         Size of the lightmap.
     progress : Progress

@@ -229,7 +229,7 @@ def _library() -> Any:
 
 
 def _mesh(library: Any, position: NDArray[np.float32], triangle: NDArray[np.int64]) -> Any:
-    """Return a mesh of pymeshlab. Its face scalars are face numbers plus one; new faces will have 0."""
+    """Return a mesh of pymeshlab. Face k has the scalar k + 1; faces that a filter adds have 0."""
     return library.Mesh(
         vertex_matrix=position.astype(np.float64),
         face_matrix=triangle.astype(np.int32),

@@ -82,7 +82,7 @@ def edit_with_flips(
     primitive : EditablePrimitive
         The primitive as in the file.
     triangle : (T, 3) int64
-        The remaining faces. Those marked in `flip` are already flipped.
+        The remaining faces. Faces marked in `flip` are already flipped.
     flip : (T,) bool
         The flipped faces.
     touched : bool

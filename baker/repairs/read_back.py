@@ -20,7 +20,7 @@ def check_readable(out: Path, data: bytes, scene: Path, *, allow_outside: bool) 
     out : Path
         The file that will be written.
     data : bytes
-        Its content, a GLB.
+        The content of the file, a GLB.
     scene : Path
         The scene file that was fixed.
     allow_outside : bool

@@ -1,7 +1,7 @@
 """Repairs the shape of a mesh: edges of more than two faces, inconsistent winding, and small holes.
 
-Faces and vertices keep all attributes of the file. The faces that close a hole are called its patch. They use
-the vertices at the border of the hole.
+Faces and vertices keep all attributes of the file. The faces that close a hole are called its patch. Patch
+faces use the vertices at the border of the hole.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from baker.trace.jit import kernel
 
 # Indices into `counts`:
 # COVERED: number of samples that at least one triangle covers;
-# COVERED_AGAIN: number of times that a further triangle covers a covered sample;
+# COVERED_AGAIN: number of times that a triangle covers a sample that an earlier triangle covers;
 # OVERLAPPING: number of triangles that share samples with an earlier triangle;
 # LISTED: number of pairs written to `pairs`.
 COVERED, COVERED_AGAIN, OVERLAPPING, LISTED = 0, 1, 2, 3

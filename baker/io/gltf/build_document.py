@@ -35,7 +35,7 @@ def new_document(scene: Scene, atlas: Atlas) -> tuple[Packer, list[BakedUse], li
     scene : Scene
         The baked scene.
     atlas : Atlas
-        Its lightmap uv, one layout for each instance.
+        The lightmap uv of the scene, one layout for each instance.
 
     Returns
     -------

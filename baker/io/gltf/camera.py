@@ -25,7 +25,8 @@ def read_cameras(placed: list[Placed], document: GltfDocument, warnings: list[Sc
     document : GltfDocument
         The document.
     warnings : list of SceneWarning
-        A warning is added for each broken camera. It is no error, because bakes do not use cameras.
+        A warning is added for each broken camera. A broken camera is no error, because bakes do not use
+        cameras.
 
     Returns
     -------

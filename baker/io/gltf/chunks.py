@@ -39,7 +39,7 @@ def split_glb(data: bytes, file: str) -> Chunks:
     data : bytes
         Content of the file.
     file : str
-        Its name, for messages.
+        Name of the file, for messages.
 
     Returns
     -------

@@ -182,7 +182,8 @@ def texture_transform(
     Notes
     -----
     The text of the extension, its example of a rotated quadrant and its test model agree on
-    u' = u cos + v sin, v' = -u sin + v cos. Its GLSL code, read as column-major, rotates the other way.
+    u' = u cos + v sin, v' = -u sin + v cos. The extension's GLSL code, read as column-major, rotates
+    the other way.
     """
     c, s = math.cos(rotation), math.sin(rotation)
     return np.array(

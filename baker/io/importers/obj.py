@@ -86,7 +86,7 @@ def obj_sha256(path: Path, data: bytes, folder: SceneFolder) -> str:
     path : Path
         The OBJ file.
     data : bytes
-        Its content.
+        The content of the file.
     folder : SceneFolder
         Folder that the file names in the OBJ file are relative to.
 
