@@ -6,8 +6,8 @@ this origin. The origin is 0 for scenes that lie around 0.
 The spacing of float32 numbers is about 2^-23 of their absolute value. An object of size s at distance d from
 the origin loses log2(d / s) of the 23 bits of its coordinates; `_UNCOUNTED_BITS` lost bits are ignored. The
 origin minimises the weighted sum of lost bits over all objects. The weight of an object is the square root of
-its number of triangles. A terrain or a backdrop around all other objects loses no bits for any origin within it.
-A single distant object usually has less weight than the other objects together.
+its number of triangles. A terrain or a backdrop around all other objects loses no bits for any origin inside
+its extent. A single distant object usually has less weight than the other objects together.
 """
 
 from __future__ import annotations

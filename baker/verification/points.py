@@ -32,7 +32,7 @@ POINTS_PER_TEXEL = 64
 # Numbers of points divided by the number of random texels: points at edges; outliers of each channel; steep
 # texels of each channel.
 _EDGES, _OUTLIERS, _STEEP = 0.35, 0.05, 0.1
-# Smallest number of points at edges.
+# Smallest number of points at edges, unless `_EDGES` gives more.
 _MIN_EDGES = 500
 # Smallest number of texels in each light level, divided by the number of random texels.
 _SCARCE = 0.1

@@ -53,7 +53,7 @@ _LISTS = ("accessors", "bufferViews", "materials", "meshes", "nodes", "images", 
 # Ignored extensions that `_check_extensions` does not report, because `material.py` reports them for each
 # material.
 _REPORTED = frozenset({"KHR_materials_transmission"})
-# Largest depth of objects and lists in each other.
+# Largest number of levels of nested JSON objects and lists.
 _DEEPEST = 100
 _COMPRESSED_VIEW = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
