@@ -11,7 +11,8 @@ from baker.cli.command import Run, command
 from baker.core.printable import printable
 from baker.core.settings import InspectSettings
 
-# Largest number of items of a list that are shown without -v and --json. The number of further items is shown.
+# Largest number of items of a list that are shown without -v and --json. For further items, their number is
+# shown.
 SHOWN = 20
 # Length to which texts in a table, such as hashes, are truncated, characters. -v shows them in full.
 LONGEST = 24

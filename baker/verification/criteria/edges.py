@@ -57,8 +57,8 @@ def evaluate(data: ChannelData) -> CriterionResult:
         members.append((f"points at edges in room {room}", chosen[points.room[chosen] == room]))
     worst, remarks = worst_metrics("edge", make_groups(data, members), data.channel)
     remarks |= {
-        "edge_wrong_share": f"{int(wrong.sum())} of {len(v)} points at edges hold twice, or less than half,"
-        f" the {data.channel} that they should",
+        "edge_wrong_share": f"{int(wrong.sum())} of {len(v)} points at edges hold more than twice or less"
+        f" than half the {data.channel} of path tracing",
     }
     return CriterionResult({**metrics, **worst}, remarks)
 

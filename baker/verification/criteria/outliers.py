@@ -29,8 +29,8 @@ def evaluate(data: ChannelData) -> CriterionResult:
         wrong = (off > np.maximum(_WRONG * scale, _Z * noise)).any(axis=1)
         metrics["wrong_suspects"] = int(wrong.sum())
         remarks["wrong_suspects"] = (
-            f"{int(wrong.sum())} single texels of {data.channel} stand out from their neighbours"
-            " and are wrong"
+            f"{int(wrong.sum())} single texels of {data.channel} differ strongly from their"
+            " neighbours and from path tracing"
         )
     return CriterionResult(metrics, remarks)
 
