@@ -36,7 +36,7 @@ HERE = Path(__file__).resolve().parent
 
 @dataclass
 class Row:
-    """The results of one program with one setting.
+    """The results of one program with one setting, that is, number of samples and denoising.
 
     Each setting is baked `--repeat` times. `seconds` is the time of the whole process of each bake, and
     `bake_seconds` the time of the bake alone. `error` is the error of the last bake.

@@ -1,12 +1,12 @@
-"""Bakes a scene.glb with Blender's Cycles in its second uv set.
+"""Bakes the light of a `scene.glb` with Blender's Cycles, into the layout of the file's second uv set.
 
 `against_cycles.py` runs this script in the Python environment that has `bpy`:
 
     python cycles_bake.py JOB.json
 
-JOB.json: {"scene", "resolution", "runs": [{"samples", "denoise", "seed", "out"}], "surface": FILE.npz}.
-Each `out` is an .npz file with `irradiance` (H, W, 3), `covered` (H, W) and `seconds`, the duration of the
-bake alone. The first row of the images is v = 0, as in glTF. Blender's triangles are written to `surface`,
+JOB.json: {"scene", "resolution", "runs": [{"samples", "denoise", "seed", "out"}], "surface": FILE.npz}. Each
+`out` is an .npz file with `irradiance` (H, W, 3), `covered` (H, W) and `seconds`, the duration of the bake
+alone. The first row of the images is v = 0, as in glTF. The script writes Blender's triangles to `surface`,
 for `path_truth.py`.
 
 The following settings make Cycles bake the same quantity as baker. A diffuse bake without colour is E / pi.
@@ -125,8 +125,8 @@ def _bake(run: dict[str, Any], image: Any) -> None:
     settings.margin, settings.use_clear = 0, True
     colour = 1.0
     if run["denoise"]:
-        # Use a combined bake, because Cycles denoises no other type. Without emission it is albedo x E / pi,
-        # so bake the albedo first and divide by it.
+        # Use a combined bake, because Cycles denoises no other type. Without emission, a combined bake is
+        # albedo x E / pi, so bake the albedo first and divide by it.
         settings.use_pass_emit = settings.use_pass_glossy = settings.use_pass_transmission = False
         kind = {"type": "COMBINED"}
         cycles.samples, cycles.use_denoising = 1, False
