@@ -74,7 +74,7 @@ def worst_metrics(prefix: str, groups: list[Group], channel: str) -> tuple[dict[
         if abs(found.sure_bias) > abs(metrics[f"{prefix}_bias"]):
             metrics[f"{prefix}_bias"] = found.sure_bias
             remarks[f"{prefix}_bias"] = (
-                f"{where} is off by {found.bias:+.1%} +- {found.bias_se:.1%} on the whole"
+                f"{where} differs from path tracing by {found.bias:+.1%} +- {found.bias_se:.1%} on average"
                 f" ({found.texels} texels)"
             )
         if abs(found.sure_colour) > abs(metrics[f"{prefix}_colour"]):
@@ -83,11 +83,11 @@ def worst_metrics(prefix: str, groups: list[Group], channel: str) -> tuple[dict[
                 f"{name} {shift:+.1%}"
                 for name, shift in zip(("red", "green", "blue"), found.colour, strict=True)
             )
-            remarks[f"{prefix}_colour"] = f"the colour of {where} is off: {shares}"
+            remarks[f"{prefix}_colour"] = f"the colour of {where} differs from path tracing: {shares}"
         if group.noise > metrics[f"{prefix}_noise"]:
             metrics[f"{prefix}_noise"] = group.noise
             remarks[f"{prefix}_noise"] = (
-                f"{where} is typically off by {found.typical:.1%}, of which {found.typical_noise:.1%} is"
-                " noise of the reference"
+                f"{where} typically differs from path tracing by {found.typical:.1%}, of which"
+                f" {found.typical_noise:.1%} is noise of path tracing"
             )
     return metrics, remarks
