@@ -65,7 +65,7 @@ def report_html(found: VerifyReport, in_words: Callable[[str], str] = str) -> st
         f"<h1>{title}</h1>",
         f'<p class="{"good" if found.passed else "bad"}">{escaped(in_words(found.verdict))}</p>',
         _failures(found, in_words),
-        _facts(found),
+        _facts(found, in_words),
         limits_table(found),
         regions_table(found),
         figures_table(found),
@@ -88,21 +88,21 @@ def _failures(found: VerifyReport, in_words: Callable[[str], str]) -> str:
     return f"<ul>{items}</ul>" if lines else ""
 
 
-def _facts(found: VerifyReport) -> str:
+def _facts(found: VerifyReport, in_words: Callable[[str], str]) -> str:
     """Return a table of the date, the versions, the settings and the effort."""
     manifest = found.bake.manifest
     baked: dict[str, Any] = manifest.get("settings", {})
-    settings = [_flag(key, baked[key]) for key in _BAKE_SETTINGS if baked.get(key) is not None]
+    settings = [_setting(key, baked[key]) for key in _BAKE_SETTINGS if baked.get(key) is not None]
     mine = {key: value for key, value in found.settings.model_dump().items() if value is not None}
-    verified = [_flag(key, value) for key, value in mine.items()]
+    verified = [_setting(key, value) for key, value in mine.items()]
     version = manifest.get("versions", {}).get("baker", "unknown")
     rows = {
         "verified": f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC, baker {VERSION}",
         "baked": f"{manifest.get('created', 'unknown')}, baker {version}",
         "scene": _scene(found),
         "folder": str(found.bake.folder),
-        "settings of the bake": ", ".join(settings),
-        "settings of verify": ", ".join(verified),
+        "settings of the bake": in_words(", ".join(settings)),
+        "settings of verify": in_words(", ".join(verified)),
         "effort": f"{len(found.pixel)} texels, {found.rays / 1e6:.1f} million rays, {found.seconds:.0f} s",
         "not compared": f"{found.invalid} invalid texels",
     }
@@ -114,9 +114,7 @@ def _scene(found: VerifyReport) -> str:
     return str(found.bake.manifest.get("input", {}).get("path") or found.bake.folder.name)
 
 
-def _flag(key: str, value: Any) -> str:
-    """Return a setting as a flag of the command line."""
-    name = key.replace("_", "-")
-    if isinstance(value, bool):
-        return f"--{name}" if value else f"--no-{name}"
-    return f"--{name} {','.join(map(str, value)) if isinstance(value, list | tuple) else value}"
+def _setting(key: str, value: Any) -> str:
+    """Return a setting as messages name it: between backticks, with a value as Python writes it."""
+    joined = ",".join(map(str, value)) if isinstance(value, list | tuple) else value
+    return f"`{key}={joined!r}`"

@@ -33,11 +33,7 @@ def limits_table(found: VerifyReport) -> str:
             f"<td>{escaped(limit.readable)}</td>{words}{_meaning(limit.metric)}</tr>"
         )
     default = found.settings.fail_if is None
-    which = (
-        "the default limits"
-        if default
-        else "the limits of <code>--fail-if</code>, which replace the default ones"
-    )
+    which = "the default limits" if default else "the given limits, which replace the default limits"
     note = (
         f"<p>These are {which}. No other limit applies: in a bake that passed, a single texel may be far off."
         " For signed figures the absolute value is compared.</p>"

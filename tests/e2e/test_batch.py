@@ -177,7 +177,8 @@ def test_stopped_in_the_middle(tree, how):
     process.communicate()
     wait_for_end(family)
     assert [path.name for path in (tree / "baked").iterdir() if not path.name.endswith(".lock")] == ["hall"]
-    if how != "kill everything":
+    if how == "ctrl-c":
+        # A killed process removes nothing; the next batch does.
         assert hidden(tree) == []
     text = (tree / "JOBS.toml").read_text()
     (tree / "JOBS.toml").write_text(text.replace("4096", "1").replace("65536", "1").replace("1024", "16"))

@@ -25,9 +25,9 @@ from baker.io.load import load_scene
 )
 def test_albedo_is_the_product_of_factor_texture_and_vertex_colour(tmp_path, factor, level, vertex, expected):
     def textured(builder):
-        surface = builder.json["materials"][0]["pbrMetallicRoughness"]
-        surface["baseColorFactor"] = [factor, factor, factor, 1.0]
-        surface["baseColorTexture"] = {"index": builder.image(png(level))}
+        texture = {"index": builder.image(png(level))}
+        surface = {"baseColorFactor": [factor, factor, factor, 1.0], "baseColorTexture": texture}
+        builder.json["materials"][0] = {"pbrMetallicRoughness": surface}
 
     attributes = {"TEXCOORD_0": SQUARE}
     if vertex is not None:
