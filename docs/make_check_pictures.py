@@ -1,9 +1,12 @@
-"""Draws the pictures of CHECKS.md from scenes of the tests: left with the defect, right without it.
+"""Draws the pictures of CHECKS.md from scenes of the tests.
+
+The left half of a picture shows a scene with the flaw that the check finds, the right half a similar scene
+without it.
 
 python docs/make_check_pictures.py
 
-Lightmap uv is drawn in page coordinates. Geometry is drawn from above, in the direction of a corner of the
-scene; fronts are grey and backs red.
+Lightmap uv is drawn in page coordinates. Geometry is drawn in parallel projection, seen obliquely from above,
+from the side of positive x and z. Fronts are grey and backs are red.
 """
 
 from __future__ import annotations
@@ -69,7 +72,7 @@ def uv_panel(context: CheckContext) -> Image.Image:
 
 
 def geometry_panel(context: CheckContext, low: np.ndarray, high: np.ndarray) -> Image.Image:
-    """Draw all triangles as seen from `view_axes`, farthest first."""
+    """Draw all triangles, farthest first, in the parallel projection of `view_axes`."""
     side = SIZE * SHARP
     image = Image.new("RGB", (side, side), PAPER)
     draw = ImageDraw.Draw(image)

@@ -21,7 +21,8 @@ from baker.kernels.cast import first_hits
 from baker.trace.embree import RayScene
 from baker.trace.packets import new_packet_buffers
 
-# Largest distance between matched points, as a share of the diagonal of the object's bounding box.
+# Largest distance between matched points, as a share of the diagonal of the object's bounding box. For
+# objects without a partner, it is the box of all such objects together.
 _MAX_DISTANCE = 1.0e-3
 # Triangles of b are moved along their normals by this share of the largest distance. If two faces are back to
 # back, a ray then hits the front-facing one first.
@@ -30,9 +31,9 @@ _LIFT = 0.01
 _ALIKE = 0.5
 # Largest number of hits that are tested along a ray.
 _LAYERS = 4
-# Limit of the share of an object's area that has matching points in the other bake. Only objects without a
-# partner (`baker.comparison.pairs`) are tested, and only against such objects of the other bake. Below this
-# limit, the object is reported as missing in the other bake.
+# An object is reported as missing in the other bake if less than this share of its area has matching points
+# there. Only objects without a partner (`baker.comparison.pairs`) are tested, and only against objects of the
+# other bake that have no partner.
 _PRESENT = 0.5
 
 
@@ -63,16 +64,16 @@ class TrianglePoints:
 
 @dataclass(frozen=True)
 class ComparedSurfaces:
-    """The surfaces of bakes a and b, and the pairs of their objects; I is the number of instances of a bake.
+    """The surfaces of bakes a and b, with A and B instances, and the pairs of their objects.
 
     Attributes
     ----------
     a, b : Geometry
-    mirrored_a, mirrored_b : (I,) bool
+    mirrored_a, mirrored_b : (A,) and (B,) bool
         Instances whose transform mirrors the mesh. The corners of their triangles have the reverse order of
         the corners in the mesh.
     pairs : ObjectPairs
-    missing_a, missing_b : (I,) bool
+    missing_a, missing_b : (A,) and (B,) bool
         Instances whose surface is missing in the other bake, see `_PRESENT`.
     """
 

@@ -29,7 +29,7 @@ from baker.trace.packets import aligned_floats
 #     FACE        unit face normal (3)
 #     MATERIAL    row of `Surfaces.material`
 #     TWO_SIDED   1 if two-sided, else 0
-#     EMITTER     code of its emitters, see `LightTable.code`
+#     EMITTER     which emitter or emitters the triangle is, see `FoundEmitters.code`
 #     TEXTURED    1 if a texture or vertex colours change its base colour, metalness or roughness, else 0
 #     EMISSION    radiance without texture, cd/m2 (3)
 #     SHINES      0: it emits nothing; 1: it emits without a texture; 2: it emits with a texture
@@ -63,7 +63,8 @@ class Surfaces(NamedTuple):
     material : (M, 8) float32
         Materials. Columns: `BASE_COLOUR` to `MATERIAL_TEXTURED` of this module.
     min_offset_scale : float
-        Metres, lower limit of the largest coordinate in `vertex.offset_origin`.
+        Metres. In `vertex.offset_origin`, the scale of the offset is the point's largest absolute coordinate,
+        but at least this value.
     default_size : float
         Metres, triangle size assumed for a ray origin whose triangle is unknown.
     lambertian : int
@@ -174,7 +175,8 @@ def build_reference(
     surfaces = _surfaces(geometry, shading, lights, lambertian)
     hit_kind = np.zeros(len(geometry.triangle), np.uint8)
     if find_solids:
-        # Only `inside_geometry` reads `hit_kind`; paths take the sides of surfaces from the materials.
+        # Only `inside_geometry` reads `hit_kind`. Paths use `doubleSided` of the materials, which
+        # `hide_backs` does not change.
         hit_kind = hide_backs(scene, geometry, shading)[1]
     return Reference(geometry, shading, surfaces, lights, rays, _sphere(geometry), count, hit_kind)
 

@@ -1,7 +1,8 @@
 """Repairs of surfaces with filters of MeshLab.
 
 This is the only module that uses pymeshlab. pymeshlab is licensed under the GPL and is not a dependency of
-baker, so it is imported only if a repair runs. All meshes in this module have one vertex for each position.
+baker, so it is imported only if a repair runs. The meshes have one vertex for each position, except those
+that are passed to `transfer`.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ def orient_by_visibility(position: NDArray[np.float32], triangle: NDArray[np.int
     _, new, origin = _apply(position, triangle, "meshing_re_orient_faces_by_geometry", rays=64)
     flip = np.zeros(len(triangle), bool)
     old = triangle[origin]
-    # Compare windings from the same vertex on, because the filter may also change the first corner.
+    # Start both windings at the same vertex, because the filter may also change which corner comes first.
     start = np.argmax(new == old[:, :1], axis=1)
     flip[origin] = np.take_along_axis(new, ((start + 1) % 3)[:, None], axis=1)[:, 0] != old[:, 1]
     return flip
@@ -200,7 +201,7 @@ def transfer(
 
 
 def _points_on(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return points of regular grids on the faces (T, 3), (N, 3) float64, including all corners.
+    """Return (N, 3) float64: points of regular grids on the faces `triangle`, including all corners.
 
     The number of points on a face is approximately proportional to its area.
     """

@@ -13,7 +13,7 @@ from baker.repairs.welded_mesh import WeldedMesh
 from baker.topology.slivers import find_slivers
 
 # A mesh is remeshed if at least this share of its faces are slivers, and if it has at least this number of
-# faces. The number of faces excludes modelled objects such as a wall of two triangles.
+# faces. The minimum number keeps modelled objects, such as a wall of two triangles, from being remeshed.
 MOST_SLIVERS = 0.1
 FEWEST_FACES = 500
 

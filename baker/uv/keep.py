@@ -16,7 +16,7 @@ from baker.uv.check import MOST_LOST, PAGE_TOLERANCE, RANGE_SLACK, page_overlap,
 
 @dataclass(frozen=True)
 class KeptUv:
-    """Which of I instances keep their TEXCOORD_1.
+    """Which of the I instances of a scene can keep their TEXCOORD_1.
 
     Attributes
     ----------
@@ -47,7 +47,8 @@ def find_fault(mesh: Mesh, resolution: int) -> tuple[str, str] | None:
     mesh : Mesh
         The mesh, which need not have TEXCOORD_1.
     resolution : int
-        Width of the page in texels, which determines the samples of the overlap test and the unit of area.
+        Width of the page in texels. It determines the number of samples of the overlap test, and the area of
+        a texel, which is the smallest uv area that is valid.
 
     Returns
     -------

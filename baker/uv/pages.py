@@ -14,7 +14,8 @@ from baker.core.settings import BakeSettings
 from baker.uv.outlines import Outlines
 from baker.uv.pack import Packing, border, fit_page, pack, texel_gap
 
-# _FIRST_FILL: share of a page's area that is filled in the first attempt, by the estimate `_Packer.need`.
+# _FIRST_FILL: in the first attempt at a page, instances are taken until their areas, which `_Packer.need`
+# estimates, add up to at most this share of the page.
 # _PAGE_TRIES: largest number of attempts to fill a page.
 _FIRST_FILL = 0.92
 _PAGE_TRIES = 8
@@ -29,7 +30,7 @@ class Page:
     instance : (N,) int64
         Indices of the instances.
     position : tuple of (n, 2) int32
-        For each instance, column and row of the lower corners of its n items.
+        For each instance and each of its n items, the smallest column and the smallest row of the item.
     density : (N,) float64, texels per metre
         Density of each instance.
     packing : Packing

@@ -17,7 +17,9 @@ _ERROR, _NOISE, _BIAS, _AXIS = "#b00020", "#999999", "#2b5f9e", "#555555"
 
 
 def level_plot(rows: list[dict[str, Any]]) -> str:
-    """Return a plot of the errors of light levels over their light; "" for fewer than two levels.
+    """Return a plot with one point for each light level: x is the level's light, y are its errors.
+
+    A light level is a group of texels with similar light. The text is empty for fewer than two levels.
 
     Parameters
     ----------

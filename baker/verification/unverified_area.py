@@ -1,4 +1,4 @@
-"""Measures the surface area that is not compared, as no valid texel stores the light of the surface."""
+"""Measures the area of surfaces that `verify` cannot compare, because the bake has no valid texel there."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ class UnverifiedArea:
     visible : float
         Part of `invalid` that is visible from points in the air. The bake should have computed its light.
     uncovered : float
-        Area on all other texels without a measured value.
+        Area on texels for which the bake computed no value and which it did not mark as invalid (status EMPTY
+        or DILATED).
     """
 
     total: float

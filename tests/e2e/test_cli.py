@@ -77,7 +77,11 @@ def bake_words(tmp_path, *more):
 
 
 def other_option(model, name):
-    """Return (text, value) of an encoding's option: the first accepted value that is not the default."""
+    """Return (argument of the flag, resulting value) for an option of an encoding.
+
+    Several candidates are tried. The first that is accepted and differs from the default is returned. The
+    argument is None for a bool.
+    """
     field = model.model_fields[name]
     if field.annotation is bool:
         return None, not field.default
@@ -91,8 +95,9 @@ def other_option(model, name):
     raise AssertionError(f"no known value is accepted by {name}")
 
 
-# {setting: (text of its flag, value)}: for each setting a value other than the default. A test below fails if
-# a setting is missing. `other_option` adds the options of encodings, so a new encoding needs no line here.
+# {setting: (argument of its flag, expected value)}, with a value other than the default for each setting. The
+# argument is None if the flag takes none. A test below fails if a setting is missing. `other_option` adds the
+# options of encodings, so a new encoding needs no line here.
 OTHER = {
     "allow_outside": (None, True),
     "channels": ("ao", ("ao",)),
@@ -378,7 +383,7 @@ def test_the_help_of_a_command_fits_80_columns_and_breaks_no_name(name, command,
     assert command(name, "--help-all")[0] == 0
     text = capsys.readouterr().out
     assert max(map(len, text.splitlines())) <= 80
-    # The help contains no type names of Python or typer, such as <int>, and no TEXT, X or braces.
+    # The help contains no type names such as <int>, no TEXT or X as the name of a value, and no braces.
     assert not re.search(r"<\w+>|\bTEXT\b|\bX\b|\{", text)
     made = getattr(importlib.import_module(f"baker.cli.{name}"), name)()
     words = set(re.split(r"[\s,()]+", text))

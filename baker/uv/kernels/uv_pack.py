@@ -127,9 +127,9 @@ def place_items(next_used, next_free, order, item_shape, first_row, low, high, g
     Parameters
     ----------
     next_used, next_free : (H, W + 1) int16
-        In and out, for each texel of the page: the columns of the first used texel and of the first free
-        texel of its row, from this texel on; W if there is none. On an empty page, `next_used` is W and
-        `next_free` is the texel's own column.
+        In and out. `next_used[y, x]` is the column of the first used texel of row y at column x or to the
+        right of it, and `next_free[y, x]` that of the first free texel; W if there is none. On an empty page,
+        `next_used` is W and `next_free` is x.
     order : (N,) int64
         Indices of the items to place, in this order.
     item_shape : (I,) int64

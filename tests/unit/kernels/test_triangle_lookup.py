@@ -42,7 +42,7 @@ def test_hits_find_the_texel_that_lies_there():
             found["black"] += 1
             continue
         found["front" if front else "back"] += 1
-        # In both cases, the texel belongs to the hit object and side.
+        # Whether or not the result equals the reference, the texel belongs to the hit object and side.
         entry = entry_at[ours]
         assert 0 <= entry < texels.n
         assert texels.instance[entry] == geometry.instance[t]
@@ -91,7 +91,10 @@ def test_pixels_beside_a_chart_know_its_texels():
 
 
 def test_two_sides_without_a_texel_are_looked_up_nowhere():
-    """If no two-sided triangle has texels, no back has a texel entry, so lookups must not return an entry."""
+    """If no two-sided triangle has texels, the texel buffer has no entries for backs.
+
+    The table must then mark all triangles as one-sided, so that no hit on a back is looked up.
+    """
     from baker.radiosity.triangle_lookup import build_triangle_lookup
 
     world = quad_world([Quad((0, 0, 0), (1, 0, 0), (0, 1, 0)), Quad((2, 0, 0), (1, 0, 0), (0, 1, 0))], 16)
