@@ -15,9 +15,9 @@ from targets import ANSWERS, SCENES, TARGETS
 from baker.trace.jit import kernel
 
 CHECKED = bool(numba.config.BOUNDSCHECK)
-SEEDS = range(100_000, 100_040) if CHECKED else range(12)
+SEEDS = range(100_000, 100_020) if CHECKED else range(6)
 # {target that reads only text files: number of its mutations}. These targets run on one scene.
-TEXT = {"config": 100, "jobs": 40}
+TEXT = {"config": 50, "jobs": 20}
 CASES = [(name, scene) for name in TARGETS for scene in range(1 if name in TEXT else len(SCENES))]
 
 
