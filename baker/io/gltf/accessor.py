@@ -45,7 +45,9 @@ def read_accessor(document: GltfDocument, index: int, *, types: tuple[str, ...])
     """
     accessor = document.root.children("accessors")[index]
     raw = _rows(document, accessor, types)
-    value: NDArray[np.float32] = raw.astype(np.float32)
+    # Adding 0 turns signalling NaNs, which raise warnings in later casts, into quiet ones.
+    with np.errstate(invalid="ignore"):
+        value: NDArray[np.float32] = raw.astype(np.float32) + np.float32(-0.0)
     if accessor.boolean("normalized", False) and raw.dtype.kind in "iu":
         value /= np.float32(np.iinfo(raw.dtype).max)
         if raw.dtype.kind == "i":

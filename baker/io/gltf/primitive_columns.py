@@ -51,7 +51,9 @@ def read_columns(source: SourceDocument, primitive: Json) -> dict[str, NDArray[n
             continue
         data = gather_rows(source.json, source.buffers, index, rows)
         if accessors[index]["componentType"] == _FLOAT and not name.startswith("_"):
-            data = (np.ascontiguousarray(data).view("<f4") + np.float32(0.0)).view(np.uint8)
+            # Adding 0 to a signalling NaN raises a warning.
+            with np.errstate(invalid="ignore"):
+                data = (np.ascontiguousarray(data).view("<f4") + np.float32(0.0)).view(np.uint8)
         column[name] = data
     return column
 

@@ -139,3 +139,14 @@ def with_extra(folder: Path, number: str) -> Path:
     builder = quad_builder()
     builder.json["nodes"][0]["extras"] = {"a": 12345}
     return write(folder / "a.gltf", builder.gltf().decode().replace("12345", number).encode())
+
+
+def test_signalling_nans_of_a_file_raise_no_warnings(tmp_path: Path) -> None:
+    builder = quad_builder()
+    normal = np.full((4, 3), 0x7FA00000, np.uint32).view(np.float32)
+    builder.json["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = builder.accessor(normal)
+    path = write(tmp_path / "a.glb", builder)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        baker.check(path)
+        fix_file(path)
