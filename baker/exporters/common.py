@@ -9,16 +9,24 @@ import shutil
 import struct
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
-from baker.io.bake.read_manifest import read_manifest
-
+MANIFEST_NAME = "bake.json"
 SCENE_NAME = "scene.glb"
 DESCRIPTION_NAME = "lightmap.json"
 # Types of lights that every reader of KHR_lights_punctual knows.
 STANDARD_LIGHTS = ("directional", "point", "spot")
 # Key of the manifest and of `lightmap.json`.
 EXPOSURE_KEY = "suggested_exposure"
+
+
+def read_manifest(bake: Path) -> dict[str, Any]:
+    """Return the manifest of a bake.
+
+    It is not validated: either the running bake has written it, or `baker.export` has read the bake.
+    """
+    manifest: dict[str, Any] = json.loads((bake / MANIFEST_NAME).read_text("utf-8"))
+    return manifest
 
 
 def irradiance_pages(manifest: dict[str, Any]) -> list[dict[str, Any]]:
@@ -71,11 +79,13 @@ def link_file(source: Path, target: Path) -> None:
 def place_bake(bake: Path, target: Path) -> dict[str, Any]:
     """Put scene, irradiance pages and `lightmap.json` into `target`; return the JSON content."""
     description = describe(read_manifest(bake))
-    document, binary = _read_glb(bake / SCENE_NAME)
-    if _replace_lights(document):
-        (target / SCENE_NAME).write_bytes(_glb(document, binary))
-    else:
+    with (bake / SCENE_NAME).open("rb") as file:
+        document = _read_document(file)
+        changed = _glb(document, file.read()) if _replace_lights(document) else None
+    if changed is None:
         link_file(bake / SCENE_NAME, target / SCENE_NAME)
+    else:
+        (target / SCENE_NAME).write_bytes(changed)
     for page in description["pages"]:
         link_file(bake / page["file"], target / page["file"])
     write_json(target / DESCRIPTION_NAME, description)
@@ -127,7 +137,8 @@ def place_named_scene(bake: Path, target: Path) -> dict[str, Any]:
         The content of `lightmap.json` with the new names.
     """
     description = describe(read_manifest(bake))
-    document, binary = _read_glb(bake / SCENE_NAME)
+    with (bake / SCENE_NAME).open("rb") as file:
+        document, binary = _read_document(file), file.read()
     _replace_lights(document)
     nodes = document.get("nodes", [])
     for index, node in enumerate(nodes):
@@ -173,11 +184,11 @@ def _replace_lights(document: dict[str, Any]) -> bool:
     return bool(foreign)
 
 
-def _read_glb(path: Path) -> tuple[dict[str, Any], bytes]:
-    data = path.read_bytes()
-    (length,) = struct.unpack_from("<I", data, 12)
-    document: dict[str, Any] = json.loads(data[20 : 20 + length])
-    return document, data[20 + length :]
+def _read_document(file: BinaryIO) -> dict[str, Any]:
+    """Read the glTF document of a GLB; the file is then at the binary chunk."""
+    (length,) = struct.unpack_from("<I", file.read(20), 12)
+    document: dict[str, Any] = json.loads(file.read(length))
+    return document
 
 
 def _glb(document: dict[str, Any], binary: bytes) -> bytes:
