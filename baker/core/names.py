@@ -7,6 +7,7 @@ from difflib import get_close_matches
 from typing import TypeVar
 
 from baker.core.errors import BakerError, SettingsError
+from baker.core.foreign_names import foreign_answer
 
 E = TypeVar("E", bound=BakerError)
 
@@ -51,6 +52,38 @@ def unknown_name(
     names = listed or f"known are {', '.join(known)}"
     hint = f"did you mean '{folded[near[0]]}'? ({names})" if near else names
     return error(f"there is no {what} '{name}'; {hint}", file=file, object=object)
+
+
+def unknown_setting(
+    what: str, name: str, known: Iterable[str], *, file: str | None = None, object: str | None = None
+) -> SettingsError:
+    """Return the error of `unknown_name` for a setting, or for a setting of another baker what to use instead.
+
+    Parameters
+    ----------
+    what : str
+        Kind of setting, in the singular.
+    name : str
+        The unknown name.
+    known : iterable of str
+        The known settings.
+    file : str or None
+        Attribute `file` of the error.
+    object : str or None
+        Attribute `object` of the error.
+
+    Returns
+    -------
+    SettingsError
+        The error; the caller raises it.
+    """
+    settings = {setting.replace("_", "-"): setting for setting in known}
+    found = foreign_answer(name, settings)
+    if found is None:
+        return unknown_name(what, name, settings.values(), file=file, object=object)
+    verb, instead = found
+    hint = f"use '{settings[instead]}'" if verb == "use" else f"see {instead}"
+    return SettingsError(f"there is no {what} '{name}'; {hint}", file=file, object=object)
 
 
 def _fold(name: str) -> str:

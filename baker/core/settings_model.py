@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Self
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from baker.core.errors import SettingsError
-from baker.core.names import unknown_name
+from baker.core.names import unknown_setting
 
 # Number of characters of an invalid value that an error quotes.
 _LONGEST = 80
@@ -143,7 +143,7 @@ class Settings(BaseModel):
         for key, value in values.items():
             name = key.replace("-", "_")
             if name not in type(self).model_fields:
-                raise unknown_name(self.what, key, list(type(self).model_fields), object=key)
+                raise unknown_setting(self.what, key, list(type(self).model_fields), object=key)
             if name in clean:
                 raise SettingsError(f"'{key}' is given twice", object=key)
             clean[name] = value

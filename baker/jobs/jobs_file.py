@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from baker.core.errors import InputError, SettingsError
-from baker.core.names import unknown_name
+from baker.core.names import unknown_name, unknown_setting
 from baker.core.settings import BakeSettings, make_settings
 from baker.io.bake.output_folder import own_files
 from baker.io.toml_file import read_toml
@@ -104,7 +104,7 @@ def _check_keys(path: Path, where: str, table: dict[str, Any], own: tuple[str, .
     for key in table:
         name = key.replace("-", "_")
         if name not in known:
-            raise unknown_name("setting", key, known, file=str(path), object=where)
+            raise unknown_setting("setting", key, known, file=str(path), object=where)
         if name in seen:
             raise _error(path, where, f"'{key}' is given twice")
         seen.add(name)

@@ -12,6 +12,7 @@ description of what is wrong, or None. A run is wrong if
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import traceback
 import warnings
@@ -27,8 +28,13 @@ from numpy.random import Generator
 import baker
 from baker.cli.config import resolve
 from baker.core.errors import BakerError
+from baker.core.export import EXPORTS
 from baker.core.settings import BakeSettings, make_settings
+from baker.io.bake.read_bake import read_bake
 from baker.io.inspect import inspect_path
+from baker.viewer.answers import page_answers
+from baker.viewer.export import export_page
+from baker.viewer.script import find_three
 
 ROOT = Path(__file__).parents[2]
 SCENES = (
@@ -112,7 +118,7 @@ def check(scene: Path, folder: Path, rng: Generator) -> str | None:
 
 @target
 def damaged(scene: Path, folder: Path, rng: Generator) -> str | None:
-    """Damage the manifest or another file of a bake, then verify, compare and inspect the bake."""
+    """Damage the manifest or another file of a bake, then verify, compare, inspect, view and export it."""
     sound = folder / f"sound-{scene.stem}"
     if not sound.exists():
         baker.bake(scene, out=sound, **SMALL)
@@ -127,12 +133,34 @@ def damaged(scene: Path, folder: Path, rng: Generator) -> str | None:
         files = sorted(p for p in out.iterdir() if p.is_file())
         file = files[int(rng.integers(len(files)))]
         file.write_bytes(mutate_bytes(file.read_bytes(), rng))
+    engine = EXPORTS.names()[int(rng.integers(len(EXPORTS.names())))]
     runs: tuple[Callable[[], Any], ...] = (
         lambda: baker.verify(out, spp=1, texels=8, threads=1),
         lambda: baker.diff(out, sound),
         lambda: inspect_path(out),
+        lambda: view(out, folder / "page"),
+        lambda: export(out, engine, folder / "exported"),
     )
     return next((found for run in runs if (found := wrong_answer(run)) is not None), None)
+
+
+def view(out: Path, page: Path) -> None:
+    """Build the viewer page of a bake, as files and as the table of the server, without opening a browser.
+
+    All addresses must be of files inside the page, and all contents must be readable.
+    """
+    shutil.rmtree(page, ignore_errors=True)
+    stored, three = read_bake(out), find_three(None)
+    export_page(stored, three, page)
+    for address, (_, content) in page_answers(stored, three).items():
+        assert re.fullmatch(r"([\w-][\w.-]*(/|$))*", address), f"the address {address!r}"
+        assert isinstance(content(), bytes)
+
+
+def export(out: Path, engine: str, folder: Path) -> None:
+    """Export a bake for an engine into a new folder."""
+    shutil.rmtree(folder, ignore_errors=True)
+    baker.export(out, engine, folder)
 
 
 JOBS = """
