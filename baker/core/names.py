@@ -57,7 +57,7 @@ def unknown_name(
 def unknown_setting(
     what: str, name: str, known: Iterable[str], *, file: str | None = None, object: str | None = None
 ) -> SettingsError:
-    """Return the error of `unknown_name` for a setting, or for a setting of another baker what to use instead.
+    """Return the error for an unknown setting, which says what to use instead of settings of other bakers.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def unknown_setting(
     Returns
     -------
     SettingsError
-        The error; the caller raises it.
+        The error of `unknown_name` if no other baker has the setting; the caller raises it.
     """
     settings = {setting.replace("_", "-"): setting for setting in known}
     found = foreign_answer(name, settings)

@@ -328,7 +328,7 @@ def _merge(
     holders += [
         (-1, extension)
         for _, view in holders
-        for extension in _extensions(view)
+        for extension in extensions_of(view)
         if isinstance(extension, dict) and "buffer" in extension
     ]
     moved: list[tuple[Json, int]] = []
@@ -337,11 +337,11 @@ def _merge(
             continue
         words = np.frombuffer(data + b"\0" * (-len(data) % 4), np.uint32)
         drop = np.zeros(len(words), bool)
-        # Leave views that exceed their buffer unchanged, because baking does not need their data.
+        # Leave views that exceed their buffer unchanged; see `dangling.py`.
         mine = [
             (index, holder, span)
             for index, holder in holders
-            if holder.get("buffer") == number and (span := _span(holder, len(data))) is not None
+            if holder.get("buffer") == number and (span := view_span(holder, len(data))) is not None
         ]
         for index, _, (start, end) in mine:
             if index in gone:
@@ -365,12 +365,13 @@ def _merge(
     return chunks, length
 
 
-def _extensions(holder: Json) -> list[Any]:
+def extensions_of(holder: Json) -> list[Any]:
+    """Return the values of all extensions of an object."""
     extensions = holder.get("extensions")
     return list(extensions.values()) if isinstance(extensions, dict) else []
 
 
-def _span(view: Json, size: int) -> tuple[int, int] | None:
+def view_span(view: Json, size: int) -> tuple[int, int] | None:
     """Return the range of bytes of a view, end exclusive, or None if it exceeds its buffer."""
     start, length = view.get("byteOffset", 0), view.get("byteLength")
     if not is_index(start) or not is_index(length) or start + length > size:

@@ -21,6 +21,7 @@ from baker.core.version import VERSION
 from baker.io.gltf.accessor_bytes import gather_rows
 from baker.io.gltf.ao_materials import BakedUse, add_ao_textures, assign_materials, reads_texcoord_1
 from baker.io.gltf.build_document import new_document
+from baker.io.gltf.dangling import break_dangling
 from baker.io.gltf.packer import Json, Packer, is_index, objects, primitive_accessors
 from baker.io.gltf.uri import UriError, is_data, read_uri
 from baker.io.scene_folder import OutsideName, SceneFolder
@@ -129,6 +130,7 @@ def _rewrite(
             replaced.update(primitive_accessors(piece.source))
             for key in ("attributes", "targets", "indices"):
                 piece.primitive.pop(key, None)
+    break_dangling(document, source.buffers, source.missing)
     packer = Packer(document, source.buffers, frozenset(replaced), missing=source.missing)
     packer.chunks = source.chunks
     uses = []

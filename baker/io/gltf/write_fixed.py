@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from baker.core.scene import SourceDocument
 from baker.io.gltf.accessor_bytes import gather_rows
+from baker.io.gltf.dangling import break_dangling
 from baker.io.gltf.edited_primitive import EditedPrimitive, ReplacedPrimitive
 from baker.io.gltf.packer import COMPONENT, Json, Packer, primitive_accessors
 from baker.io.gltf.write_baked import embed_images
@@ -46,6 +47,7 @@ def write_fixed(
         replaced.update(primitive_accessors(primitive))
         for key in ("attributes", "indices"):
             primitive.pop(key, None)
+    break_dangling(document, source.buffers, source.missing)
     packer = Packer(document, source.buffers, frozenset(replaced), missing=source.missing)
     packer.chunks = source.chunks
     for (mesh, number), new in edits.items():
