@@ -9,6 +9,7 @@ Based on: the OpenEXR file layout and its standard attributes (openexr.com, "Sta
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import sys
 import threading
@@ -172,8 +173,11 @@ def _check_size(path: Path, window: Any) -> None:
 
 @contextlib.contextmanager
 def _silent_library() -> Iterator[None]:
-    """Discard what OpenEXR prints to stderr about damaged files, because it raises exceptions as well."""
-    with _PRINTING:
+    """Discard what OpenEXR prints about damaged files, because it raises exceptions as well.
+
+    The C++ library writes to the descriptor of stderr, and its Python module prints to `sys.stdout`.
+    """
+    with _PRINTING, contextlib.redirect_stdout(io.StringIO()):
         if sys.stderr is not None:
             sys.stderr.flush()
         try:
