@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import struct
+from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -18,6 +19,9 @@ DESCRIPTION_NAME = "lightmap.json"
 STANDARD_LIGHTS = ("directional", "point", "spot")
 # Key of the manifest and of `lightmap.json`.
 EXPOSURE_KEY = "suggested_exposure"
+
+# Changes a glTF document and the content of `lightmap.json` in place.
+Change = Callable[[dict[str, Any], dict[str, Any]], None]
 
 
 def read_manifest(bake: Path) -> dict[str, Any]:
@@ -125,11 +129,19 @@ def write_readme(
     write_text(target / "README.md", "\n".join(lines) + "\n")
 
 
-def place_named_scene(bake: Path, target: Path) -> dict[str, Any]:
+def place_named_scene(bake: Path, target: Path, change: Change | None = None) -> dict[str, Any]:
     """Write scene.glb with a unique name for each node, for engines that identify nodes by name.
 
     The name of node i is its old name, with characters that engines interpret replaced by `_`, followed by
     `_n<i>`. The mesh of a baked node gets the same name, and `extras.baker_node` is i.
+
+    Parameters
+    ----------
+    bake : Path
+        Folder of the bake.
+    target : Path
+    change : callable, optional
+        Changes the glTF document and the content of `lightmap.json` before the scene is written.
 
     Returns
     -------
@@ -151,6 +163,8 @@ def place_named_scene(bake: Path, target: Path) -> dict[str, Any]:
         entry["name"] = node["name"]
         if "mesh" in node:
             document["meshes"][node["mesh"]]["name"] = node["name"]
+    if change is not None:
+        change(document, description)
     (target / SCENE_NAME).write_bytes(_glb(document, binary))
     return description
 

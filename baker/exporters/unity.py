@@ -1,4 +1,4 @@
-"""Writes files for Unity: pages that hold E / pi, and scripts that import them and assign them to renderers.
+"""Writes files for Unity: pages that hold E / pi, and a package that assigns them to renderers.
 
 Unity multiplies a lightmap by the albedo and not by 1 / pi, so the pages are divided by pi. Unity's glTF
 importers replace v by 1 - v, and Unity stores image rows bottom-up, so pages need no flip. The scale (su, sv)
@@ -31,7 +31,19 @@ from baker.exporters.common import (
 # Header attributes of a page that are copied, because they stay valid after the division by pi.
 _KEPT = ("colourSpace", "software")
 
-SCRIPTS = ("Editor/BakerLightmapImporter.cs", "BakerLightmaps.cs")
+# Unity ignores folders whose name ends in `~`. Therefore the folders of several bakes can be copied into
+# Assets although all contain the same scripts. The package is installed once, in the project's Packages.
+PACKAGE = "Packages~/com.baker.lightmaps"
+PACKAGE_FILES = (
+    "package.json",
+    "Runtime/Baker.Lightmaps.asmdef",
+    "Runtime/BakerLightmaps.cs",
+    # Its constant GUID keeps the references of scenes to the component if the package is copied again.
+    "Runtime/BakerLightmaps.cs.meta",
+    "Editor/Baker.Lightmaps.Editor.asmdef",
+    "Editor/BakerLightmapsMenu.cs",
+    "Editor/LightmapShaders.cs",
+)
 
 
 class UnityExport:
@@ -41,24 +53,25 @@ class UnityExport:
 
     def write(self, bake: Path, target: Path) -> None:
         """Write the files of the export into `target`."""
-        description = place_named_scene(bake, target)
+        description = place_named_scene(bake, target, change=_remove_occlusion)
         for page in description["pages"]:
             _write_page(bake / page["file"], target / page["file"])
         write_json(target / DESCRIPTION_NAME, unity_description(description))
-        for script in SCRIPTS:
-            (target / script).parent.mkdir(exist_ok=True)
-            write_text(target / script, template("unity", Path(script).name))
+        for name in PACKAGE_FILES:
+            path = target / PACKAGE / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_text(path, template("unity", name))
         write_readme(
             bake,
             target,
             "Lightmaps for Unity",
             steps=(
-                "Copy the folder into Assets. To import scene.glb, install glTFast or UnityGLTF.",
-                "Put scene.glb into the open scene, select it, and choose Baker > Apply lightmaps.",
-                "The component BakerLightmaps stores the pages in the scene. Delete lights of scene.glb.",
-                "Do not use occlusion maps, because the pages already contain occlusion.",
+                f"Once per project: copy {PACKAGE} into Packages, and install glTFast.",
+                "Copy this folder into Assets, each bake into its own folder. Put scene.glb into the scene,",
+                "select it, and choose Baker > Apply lightmaps; repeat this after every bake.",
+                "Before you build a game, choose Baker > Keep lightmap shaders in builds.",
             ),
-            scale="Pages contain E / pi, the radiance of a white surface, cd/m2; Unity multiplies by albedo.",
+            scale="0.3183 (1 / pi). Pages contain E x 0.3183, the radiance of a white surface, cd/m2.",
             uv="TEXCOORD_1, which is Unity's `uv2` (Mesh.uv2).",
             rows="v = 0 is the first row. glTF importers replace v by 1 - v, and Unity stores images "
             "bottom-up, so no flip is needed.",
@@ -82,6 +95,12 @@ def unity_description(description: dict[str, Any]) -> dict[str, Any]:
             for entry in description["objects"]
         ],
     }
+
+
+def _remove_occlusion(document: dict[str, Any], description: dict[str, Any]) -> None:
+    """Remove the occlusion textures, by which Unity would darken lightmaps that contain occlusion already."""
+    for material in document.get("materials", []):
+        material.pop("occlusionTexture", None)
 
 
 def scale_offset(scale: list[float], offset: list[float]) -> list[float]:

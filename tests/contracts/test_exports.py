@@ -185,6 +185,10 @@ def test_engines_that_go_by_names_get_a_name_for_each_node(bake, name):
         assert new["meshes"][node["mesh"]]["name"] == node["name"]
     found = json.loads((out / name / "lightmap.json").read_text("utf-8"))["objects"]
     assert [entry["name"] for entry in found] == names
+    if name == "unity":
+        # Unity would multiply the lightmap by the occlusion texture, and the pages contain occlusion.
+        for material in old["materials"]:
+            del material["occlusionTexture"]
     for key in ("accessors", "bufferViews", "materials"):
         assert new[key] == old[key]
 
@@ -218,10 +222,10 @@ def test_unity_scale_and_offset_are_for_v_upwards():
 
 def test_unity_json_has_the_fields_of_the_script(bake):
     found = json.loads((bake[0] / "unity" / "lightmap.json").read_text("utf-8"))
-    source = template("unity", "BakerLightmapImporter.cs")
+    source = template("unity", "Editor/BakerLightmapsMenu.cs")
     for kind, entry in (("Page", found["pages"][0]), ("BakedObject", found["objects"][0])):
-        body = re.search(rf"class {kind}\n    {{(.*?)\n    }}", source, re.DOTALL).group(1)
-        assert set(re.findall(r"public \S+ (\w+);", body)) == set(entry)
+        body = re.search(rf"class {kind}\s*{{(.*?)}}", source, re.DOTALL).group(1)
+        assert set(re.findall(r"public \S+ (\w+) =", body)) == set(entry)
 
 
 @pytest.mark.parametrize("name", ["unreal", "blender"])

@@ -26,15 +26,6 @@ def errors(module, source):
     return found
 
 
-@pytest.mark.parametrize("name", ["BakerLightmaps.cs", "BakerLightmapImporter.cs"])
-def test_c_sharp(name):
-    import tree_sitter_c_sharp
-
-    source = template("unity", name)
-    assert errors(tree_sitter_c_sharp, source) == []
-    assert errors(tree_sitter_c_sharp, source.replace("{", "", 1)), "the check sees what is wrong"
-
-
 def test_rust(probe):
     import tree_sitter_rust
 
