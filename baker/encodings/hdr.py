@@ -65,15 +65,7 @@ class HdrEncoding(Encoding[EncodingOptions]):
             If the file cannot be written.
         """
         check_pixels(pixels, self.components, path.name)
-        height, width = pixels.shape[:2]
-        lines = [f"# {key}: {text}" for key, text in sorted(header.items())]
-        # PRIMARIES: CIE xy of the Rec.709 primaries and of D65 white. EXPOSURE: factor of the values.
-        about = ["#?RADIANCE", *lines, "FORMAT=32-bit_rle_rgbe", "EXPOSURE=1.0"]
-        about += ["PRIMARIES=0.64 0.33 0.30 0.60 0.15 0.06 0.3127 0.3290"]
-        head = "\n".join(about) + f"\n\n-Y {height} +X {width}\n"
-        rgbe = _to_rgbe(pixels)
-        body = [_coded(row) for row in rgbe] if width in _CODED else [rgbe.tobytes()]
-        write_image(path, head.encode("utf-8") + b"".join(body))
+        write_image(path, hdr_file(pixels, header))
 
     def decode(self, path: Path) -> DecodedImage:
         """Read a file.
@@ -97,6 +89,32 @@ class HdrEncoding(Encoding[EncodingOptions]):
 
 
 ENCODINGS.register("hdr")(HdrEncoding())
+
+
+def hdr_file(pixels: NDArray[np.float32], header: Mapping[str, str]) -> bytes:
+    """Return the content of a Radiance HDR file.
+
+    Parameters
+    ----------
+    pixels : (H, W, 3) float32
+        Row 0 is the top row.
+    header : mapping of str to str
+        Written as comments.
+
+    Returns
+    -------
+    bytes
+        Header and run-length coded pixels.
+    """
+    height, width = pixels.shape[:2]
+    lines = [f"# {key}: {text}" for key, text in sorted(header.items())]
+    # PRIMARIES: CIE xy of the Rec.709 primaries and of D65 white. EXPOSURE: factor of the values.
+    about = ["#?RADIANCE", *lines, "FORMAT=32-bit_rle_rgbe", "EXPOSURE=1.0"]
+    about += ["PRIMARIES=0.64 0.33 0.30 0.60 0.15 0.06 0.3127 0.3290"]
+    head = "\n".join(about) + f"\n\n-Y {height} +X {width}\n"
+    rgbe = _to_rgbe(pixels)
+    body = [_coded(row) for row in rgbe] if width in _CODED else [rgbe.tobytes()]
+    return head.encode("utf-8") + b"".join(body)
 
 
 def _to_rgbe(pixels: NDArray[np.float32]) -> NDArray[np.uint8]:

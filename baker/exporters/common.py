@@ -12,6 +12,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from baker.core.encoding import DecodedImage, encoding_of
+
 MANIFEST_NAME = "bake.json"
 SCENE_NAME = "scene.glb"
 DESCRIPTION_NAME = "lightmap.json"
@@ -80,9 +82,8 @@ def link_file(source: Path, target: Path) -> None:
         shutil.copy2(source, target)
 
 
-def place_bake(bake: Path, target: Path) -> dict[str, Any]:
-    """Put scene, irradiance pages and `lightmap.json` into `target`; return the JSON content."""
-    description = describe(read_manifest(bake))
+def place_scene(bake: Path, target: Path) -> None:
+    """Put `scene.glb` of a bake into `target`, with lights that every loader knows."""
     with (bake / SCENE_NAME).open("rb") as file:
         document = _read_document(file)
         changed = _glb(document, file.read()) if _replace_lights(document) else None
@@ -90,10 +91,23 @@ def place_bake(bake: Path, target: Path) -> dict[str, Any]:
         link_file(bake / SCENE_NAME, target / SCENE_NAME)
     else:
         (target / SCENE_NAME).write_bytes(changed)
+
+
+def place_bake(bake: Path, target: Path) -> dict[str, Any]:
+    """Put scene, irradiance pages and `lightmap.json` into `target`; return the JSON content."""
+    description = describe(read_manifest(bake))
+    place_scene(bake, target)
     for page in description["pages"]:
         link_file(bake / page["file"], target / page["file"])
     write_json(target / DESCRIPTION_NAME, description)
     return description
+
+
+def decode_page(bake: Path, file: str) -> DecodedImage:
+    """Return the pixels and the header of a page of a bake."""
+    encoding = encoding_of(file)
+    assert encoding is not None, "the bake wrote this file itself"
+    return encoding.decode(bake / file)
 
 
 def template(export: str, name: str) -> str:

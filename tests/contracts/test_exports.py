@@ -22,6 +22,7 @@ from baker.core.export import EXPORTS, check_exports
 from baker.core.lightmap import BakeResult
 from baker.core.settings import make_settings
 from baker.encodings.exr import decode_exr
+from baker.encodings.hdr import HdrEncoding
 from baker.exporters.common import template, unique_name
 from baker.exporters.unity import scale_offset
 from baker.io.bake.write_bake import write_bake
@@ -92,7 +93,9 @@ def document(path):
 
 
 def test_the_exports_of_the_contract_are_there():
-    assert {"gltf", "unity", "unreal", "godot", "three", "bevy", "babylon", "blender", "unlit"} <= set(NAMES)
+    assert {
+        "gltf", "unity", "unreal", "godot", "three", "bevy", "babylon", "blender", "playcanvas", "unlit",
+    } <= set(NAMES)  # fmt: skip
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -168,6 +171,20 @@ def test_web_exports_keep_scene_and_pages(bake, name):
         assert (out / name / file).read_bytes() == (out / file).read_bytes()
     found = json.loads((out / name / "lightmap.json").read_text("utf-8"))
     assert [(o["node"], o["page"]) for o in found["objects"]] == [(i, i % 2) for i in range(len(NODES))]
+
+
+def test_playcanvas_pages_hold_lx_and_objects_their_own_meshes(bake):
+    out, _ = bake
+    found = json.loads((out / "playcanvas" / "lightmap.json").read_text("utf-8"))
+    for number, page in enumerate(found["pages"]):
+        light = decode_exr(out / f"irradiance_{number}.exr").pixels
+        image = HdrEncoding().decode(out / "playcanvas" / page["file"])
+        assert np.abs(image.pixels - light).max() <= light.max() / 256
+        assert image.header["unit"] == "lx"
+    nodes = document(out / "playcanvas" / "scene.glb")["nodes"]
+    meshes = [entry["mesh"] for entry in found["objects"]]
+    assert meshes == [nodes[entry["node"]]["mesh"] for entry in found["objects"]]
+    assert len(set(meshes)) == len(NODES)
 
 
 @pytest.mark.parametrize("name", ["blender", "godot", "unity", "unreal", "bevy"])

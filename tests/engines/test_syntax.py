@@ -34,7 +34,7 @@ def test_rust(probe):
     assert errors(tree_sitter_rust, source.rstrip()[:-1]), "the check sees what is wrong"
 
 
-@pytest.mark.parametrize("name", ["three", "babylon"])
+@pytest.mark.parametrize("name", ["three", "babylon", "playcanvas"])
 def test_javascript(tmp_path, name):
     path = tmp_path / "lightmap.mjs"
     path.write_text(template(name, "lightmap.js"), "utf-8")

@@ -13,7 +13,7 @@ from __future__ import annotations
 FIRST = ("cornell", "holes", "glass", "verify", "pictures")
 
 _TINY = "--resolution 32 --samples 4"
-_EXPORTS = "gltf,three,babylon,godot,unity,unreal,bevy,blender,unlit"
+_EXPORTS = "gltf,three,babylon,playcanvas,godot,unity,unreal,bevy,blender,unlit"
 _ESTIMATORS = ("uniform", "cosine", "stratified", "light", "bsdf", "mis", "mis-power", "bdpt")
 _PICTURE = "--width 32 --height 24 --spp 4"
 _COMMANDS = ("bake", "ao", "check", "batch", "verify", "diff", "render", "view", "inspect")

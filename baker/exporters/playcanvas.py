@@ -1,0 +1,77 @@
+"""Writes files for PlayCanvas: scene.glb, the pages as Radiance HDR, and a module that loads both.
+
+PlayCanvas has no reader of EXR files. It finds an object by its mesh, because it changes repeated names.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from baker.core.export import EXPORTS
+from baker.encodings.hdr import HdrEncoding, hdr_file
+from baker.exporters.common import (
+    DESCRIPTION_NAME,
+    decode_page,
+    describe,
+    place_scene,
+    read_manifest,
+    template,
+    write_json,
+    write_readme,
+    write_text,
+)
+
+# Header attributes of a page that the Radiance file repeats.
+_KEPT = ("colourSpace", "quantity", "software", "unit")
+
+
+class PlayCanvasExport:
+    """The export `playcanvas`."""
+
+    needs: tuple[str, ...] = ("irradiance",)
+
+    def write(self, bake: Path, target: Path) -> None:
+        """Write the files of the export into `target`."""
+        manifest = read_manifest(bake)
+        description = describe(manifest)
+        place_scene(bake, target)
+        for page in description["pages"]:
+            page["file"] = _write_page(bake, page["file"], target)
+        write_json(target / DESCRIPTION_NAME, _with_meshes(description, manifest))
+        write_text(target / "lightmap.js", template("playcanvas", "lightmap.js"))
+        write_readme(
+            bake,
+            target,
+            "Lightmaps for PlayCanvas",
+            steps=(
+                "Serve this folder, and load it with lightmap.js (PlayCanvas engine 2):",
+                "`import { loadBake } from './playcanvas/lightmap.js';`",
+                "`const { entity } = await loadBake(pc, app, 'playcanvas/'); app.root.addChild(entity);`",
+                "lightmap.js switches the lights of scene.glb off, because the pages contain their light.",
+            ),
+            scale="The pages contain irradiance E in lx; lightmap.js multiplies by 1 / pi, and materials "
+            "show albedo x E / pi in cd/m2. The option `{ exposure: x }` multiplies all light by x.",
+            uv="TEXCOORD_1, which is `lightMapUv = 1`.",
+            rows="v = 0 is the first row, in the file and in PlayCanvas.",
+        )
+
+
+EXPORTS.register("playcanvas")(PlayCanvasExport())
+
+
+def _write_page(bake: Path, file: str, target: Path) -> str:
+    """Write a page as Radiance HDR, in lx, and return its name."""
+    image = decode_page(bake, file)
+    path = (target / file).with_suffix(HdrEncoding.suffix)
+    path.write_bytes(hdr_file(image.pixels, {key: image.header[key] for key in _KEPT if key in image.header}))
+    return path.name
+
+
+def _with_meshes(description: dict[str, Any], manifest: dict[str, Any]) -> dict[str, Any]:
+    """Return the description with the index of the mesh of each object, which no other object has."""
+    meshes = {entry["node"]: entry["mesh"] for entry in manifest["instances"]}
+    return {
+        **description,
+        "objects": [{**entry, "mesh": meshes[entry["node"]]} for entry in description["objects"]],
+    }
