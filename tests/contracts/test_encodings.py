@@ -171,7 +171,7 @@ def test_errors_are_sentences(tmp_path, name):
 def test_suffixes_tell_encodings_apart():
     suffixes = [ENCODINGS.get(name).suffix for name in ENCODINGS.names()]
     assert len(set(suffixes)) == len(suffixes)
-    assert {"exr", "hdr", "rgbm", "png8", "png16"} <= set(ENCODINGS.names())
+    assert {"exr", "hdr", "ktx2", "rgbm", "png8", "png16"} <= set(ENCODINGS.names())
     assert encoding_of("a.png") is None
     assert encoding_of("A.RGBM.PNG") is ENCODINGS.get("rgbm")
 

@@ -29,6 +29,7 @@ VERSION = 1
 _LIBRARIES = {
     "embree": "embreex", "xatlas": "xatlas", "numba": "numba", "numpy": "numpy",
     "scipy": "scipy", "openimagedenoise": "pyoidn", "openexr": "OpenEXR", "pillow": "Pillow",
+    "zstd": "backports.zstd",
 }  # fmt: skip
 
 

@@ -321,7 +321,7 @@ def test_an_encoding_that_no_channel_fits_is_refused() -> None:
         (("hdr",), ao, "three"),
         (("png16",), light, "one component"),
         (("exr",), ao, "in any case"),
-        (("jpeg",), ao, "known are hdr, png16, png8, rgbm"),
+        (("jpeg",), ao, "known are hdr, ktx2, png16, png8, rgbm"),
     ]:
         with pytest.raises(SettingsError, match=words):
             check_encodings(names_, components)
