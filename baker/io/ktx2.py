@@ -102,14 +102,14 @@ def decode_ktx2(path: Path) -> tuple[NDArray[np.uint32], dict[str, str]]:
 def _decoded(data: bytes) -> tuple[NDArray[np.uint32], dict[str, str]]:
     if not data.startswith(_IDENTIFIER):
         raise ValueError("no KTX2 identifier")
-    _, kind, _, width, height, depth, layers, faces, _, scheme, *places = _HEAD.unpack_from(data)
+    _, kind, _, width, height, depth, layers, faces, _, scheme, *parts = _HEAD.unpack_from(data)
     if kind != _FORMAT or depth or layers > 1 or faces != 1:
         raise ValueError(f"only flat images of format {_FORMAT} are read; its format is {kind}")
     if scheme not in (_UNCOMPRESSED, _ZSTANDARD):
         raise ValueError(f"its compression {scheme} is neither absent nor Zstandard")
     if not (1 <= width <= _LARGEST and 1 <= height <= _LARGEST):
         raise ValueError(f"its size is {width} x {height} texels; at most {_LARGEST} a side are read")
-    text = _texts(_part(data, places[2], places[3]))
+    text = _texts(_part(data, parts[2], parts[3]))
     if text.get("KTXorientation", "rd") != "rd":
         raise ValueError("its rows do not run from top to bottom")
     at, size, _ = _LEVEL.unpack_from(data, _HEAD.size)
