@@ -15,7 +15,7 @@ class BabylonExport:
 
     def write(self, bake: Path, target: Path) -> None:
         """Write the files of the export into `target`."""
-        place_bake(bake, target)
+        place_bake(bake, target, encodings=("ktx2",))
         write_text(target / "lightmap.js", template("babylon", "lightmap.js"))
         write_readme(
             bake,
@@ -31,8 +31,9 @@ class BabylonExport:
             scale="The pages contain irradiance E in lx; materials show albedo x E / pi in cd/m2. "
             "The option `{ exposure: x }` multiplies all light by x.",
             uv="TEXCOORD_1, which is `coordinatesIndex = 1`.",
-            rows="v = 0 is the first row of the EXR. Babylon.js stores the rows bottom-up, so lightmap.js "
-            "replaces v by 1 - v.",
+            rows="v = 0 is the first row of each file. Babylon.js stores the rows of an EXR bottom-up, so "
+            "lightmap.js replaces v by 1 - v. For KTX2 pages (`--encode ktx2`, option `{ zstd: decoder }`), "
+            "v stays.",
         )
 
 

@@ -93,12 +93,26 @@ def place_scene(bake: Path, target: Path) -> None:
         (target / SCENE_NAME).write_bytes(changed)
 
 
-def place_bake(bake: Path, target: Path) -> dict[str, Any]:
-    """Put scene, irradiance pages and `lightmap.json` into `target`; return the JSON content."""
-    description = describe(read_manifest(bake))
+def place_bake(bake: Path, target: Path, *, encodings: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Put scene, irradiance pages and `lightmap.json` into `target`; return the JSON content.
+
+    Parameters
+    ----------
+    bake : Path
+        Folder of the bake.
+    target : Path
+    encodings : tuple of str
+        Further encodings of a page that are placed, too, if the bake has them. The page's entry in
+        `lightmap.json` then has the name of the file under the name of the encoding.
+    """
+    manifest = read_manifest(bake)
+    description = describe(manifest)
     place_scene(bake, target)
-    for page in description["pages"]:
-        link_file(bake / page["file"], target / page["file"])
+    for page, source in zip(description["pages"], irradiance_pages(manifest), strict=True):
+        others = {entry["encoding"]: entry["file"] for entry in source.get("encodings", [])}
+        page |= {name: others[name] for name in encodings if name in others}
+        for file in (page["file"], *(page[name] for name in encodings if name in page)):
+            link_file(bake / file, target / file)
     write_json(target / DESCRIPTION_NAME, description)
     return description
 

@@ -15,7 +15,7 @@ class ThreeExport:
 
     def write(self, bake: Path, target: Path) -> None:
         """Write the files of the export into `target`."""
-        place_bake(bake, target)
+        place_bake(bake, target, encodings=("ktx2",))
         write_text(target / "lightmap.js", template("three", "lightmap.js"))
         write_readme(
             bake,
@@ -31,8 +31,8 @@ class ThreeExport:
             scale="The pages contain irradiance E in lx; used as `lightMap`, they give albedo x E / pi "
             "in cd/m2. The option `{ exposure: x }` multiplies all light by x.",
             uv="TEXCOORD_1, which is `uv1`; a texture needs `channel = 1`.",
-            rows="v = 0 is the first row of the EXR. EXRLoader stores the rows bottom-up, so lightmap.js "
-            "replaces v by 1 - v.",
+            rows="v = 0 is the first row of each file. EXRLoader stores the rows bottom-up, so lightmap.js "
+            "replaces v by 1 - v. For KTX2 pages (`--encode ktx2`, option `{ ktx2: loader }`), v stays.",
         )
 
 

@@ -173,6 +173,18 @@ def test_web_exports_keep_scene_and_pages(bake, name):
     assert [(o["node"], o["page"]) for o in found["objects"]] == [(i, i % 2) for i in range(len(NODES))]
 
 
+@pytest.mark.parametrize("name", ["three", "babylon"])
+def test_web_exports_have_the_ktx2_pages_of_a_bake(tmp_path, name):
+    write_bake(result(tmp_path / "in", export=name, encode="ktx2,hdr"), tmp_path / "out")
+    folder = tmp_path / "out" / name
+    pages = json.loads((folder / "lightmap.json").read_text("utf-8"))["pages"]
+    assert [page["ktx2"] for page in pages] == ["irradiance_0.ktx2", "irradiance_1.ktx2"]
+    for page in pages:
+        for file in (page["ktx2"], page["file"]):
+            assert (folder / file).read_bytes() == (tmp_path / "out" / file).read_bytes()
+    assert not list(folder.glob("*.hdr"))
+
+
 def test_playcanvas_pages_hold_lx_and_objects_their_own_meshes(bake):
     out, _ = bake
     found = json.loads((out / "playcanvas" / "lightmap.json").read_text("utf-8"))

@@ -47,10 +47,10 @@ def test_offset_and_scale_of_an_object_are_used(browser, probe, tmp_path):
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("texture.vScale = -object.uv_scale[1]", "texture.vScale = object.uv_scale[1]"),
+        (": -object.uv_scale[1]", ": object.uv_scale[1]"),
         ("texture.coordinatesIndex = 1", "texture.coordinatesIndex = 0"),
         ("texture.level = exposure / Math.PI", "texture.level = exposure"),
-        ("texture.gammaSpace = false", "texture.gammaSpace = true"),
+        ("texture.gammaSpace = false; resolve", "texture.gammaSpace = true; resolve"),
         ("lit.useLightmapAsShadowmap = true", "lit.useLightmapAsShadowmap = false"),
     ],
     ids=["v not turned over", "channel 0", "no pi", "srgb", "added"],

@@ -53,7 +53,7 @@ def test_offset_and_scale_of_an_object_are_used(browser, probe, tmp_path):
 @pytest.mark.parametrize(
     ("right", "wrong", "matte"),
     [
-        ("scaleU, -scaleV", "scaleU, scaleV", True),
+        ("topDown ? scaleV : -scaleV", "scaleV", True),
         ("texture.channel = 1", "texture.channel = 0", True),
         ("lit.lightMapIntensity = exposure", "lit.lightMapIntensity = exposure * Math.PI", True),
         ("lit.aoMap = null;", "", False),

@@ -12,21 +12,25 @@ import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 //   exposure  factor of all light; with 1, the default, materials show radiance in cd/m2
 //   matte     true (default): use MeshLambertMaterial, which shows albedo * E / pi; false: keep the materials
 //   lights    false (default): hide the lights of the file, because the light maps contain their light
+//   ktx2      a KTX2Loader after detectSupport(renderer): load the KTX2 pages, which need `--encode ktx2`
 export async function loadBake(folder, options = {}) {
+  const { ktx2 } = options;
   const base = folder.endsWith('/') ? folder : folder + '/';
   const bake = JSON.parse(await new FileLoader().loadAsync(base + 'lightmap.json'));
-  const exr = new EXRLoader();
+  if (ktx2 && bake.pages.some((page) => !page.ktx2)) throw new Error('no KTX2 pages; bake with --encode ktx2');
+  const loader = ktx2 ?? new EXRLoader();
   const [gltf, ...textures] = await Promise.all([
     new GLTFLoader().loadAsync(base + bake.scene),
-    ...bake.pages.map((page) => exr.loadAsync(base + page.file)),
+    ...bake.pages.map((page) => loader.loadAsync(base + (ktx2 ? page.ktx2 : page.file))),
   ]);
-  applyLightmaps(gltf, bake, textures, options);
+  applyLightmaps(gltf, bake, textures, { ...options, topDown: Boolean(ktx2) });
   return { gltf, bake, textures };
 }
 
-// Assigns light maps to the objects of a loaded glTF.
+// Assigns light maps to the objects of a loaded glTF. Set the option `topDown` if the textures have the first row of
+// the files at v = 0, as those of KTX2Loader have; textures of EXRLoader have the last row there.
 export function applyLightmaps(gltf, bake, textures, options = {}) {
-  const { exposure = 1, matte = true, lights = false } = options;
+  const { exposure = 1, matte = true, lights = false, topDown = false } = options;
   const byNode = new Map(bake.objects.map((object) => [object.node, object]));
   const byName = uniqueNames(bake.objects);
   const placed = new Map();
@@ -39,7 +43,7 @@ export function applyLightmaps(gltf, bake, textures, options = {}) {
     if (object === undefined && index === undefined) object = inherited;
     if (node.isLight && !lights) node.visible = false;
     if (node.isMesh && object !== undefined) {
-      const texture = placedTexture(textures, object, placed);
+      const texture = placedTexture(textures, object, topDown, placed);
       node.material = Array.isArray(node.material)
         ? node.material.map((material) => litMaterial(material, texture, exposure, matte, materials))
         : litMaterial(node.material, texture, exposure, matte, materials);
@@ -50,7 +54,7 @@ export function applyLightmaps(gltf, bake, textures, options = {}) {
 }
 
 // Returns a page's texture with the uv transform of an object; objects with equal transforms share it.
-function placedTexture(textures, object, placed) {
+function placedTexture(textures, object, topDown, placed) {
   const key = [object.page, ...object.uv_scale, ...object.uv_offset].join();
   if (!placed.has(key)) {
     const texture = textures[object.page].clone();
@@ -58,11 +62,11 @@ function placedTexture(textures, object, placed) {
     texture.colorSpace = NoColorSpace;
     texture.minFilter = texture.magFilter = LinearFilter;
     texture.generateMipmaps = false;
-    // EXRLoader stores rows bottom-up, but v = 0 is the first row of the EXR: replace v by 1 - v.
     const [scaleU, scaleV] = object.uv_scale;
     const [offsetU, offsetV] = object.uv_offset;
-    texture.repeat.set(scaleU, -scaleV);
-    texture.offset.set(offsetU, 1 - offsetV);
+    // v = 0 is the first row of a page. If the texture has the last row there, replace v by 1 - v.
+    texture.repeat.set(scaleU, topDown ? scaleV : -scaleV);
+    texture.offset.set(offsetU, topDown ? offsetV : 1 - offsetV);
     texture.needsUpdate = true;
     placed.set(key, texture);
   }
