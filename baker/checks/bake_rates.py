@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from baker.core.errors import SettingsError
+from baker.core.errors import BakerError, InputError, SettingsError
 from baker.core.stage import Stage
 from baker.io.bake.output_folder import MANIFEST_NAME
+from baker.io.bake.read_manifest import read_manifest
 from baker.io.regular_file import read_regular
 
 # Number of entries of the scene's folder that are searched for `bake.json`.
@@ -84,11 +85,11 @@ def rates_of(folder: Path) -> Rates:
     Raises
     ------
     SettingsError
-        If the folder has no bake, or the manifest lacks the numbers of rays or the timings.
+        If the folder has no bake, or its manifest is damaged.
     """
     try:
-        return rates_of_bake(json.loads(read_regular(folder / MANIFEST_NAME, most=_MOST_BYTES)))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return rates_of_bake(read_manifest(folder))
+    except InputError:
         why = f"the folder holds no bake whose {MANIFEST_NAME} tells its rays and timings; name another one"
         raise SettingsError(why, file=str(folder), object="rates") from None
 
@@ -103,11 +104,14 @@ def rates_beside(scene: Path) -> Rates | None:
     # Python raises RuntimeError for a loop of symbolic links.
     with contextlib.suppress(OSError, ValueError, RuntimeError):
         for folder in sorted(scene.resolve().parent.iterdir())[:_MOST_FOLDERS]:
-            path = folder / MANIFEST_NAME
             # Skip unreadable manifests: the user did not name these folders.
-            with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
-                manifest: dict[str, Any] = json.loads(read_regular(path, most=_MOST_BYTES))
-                if (folder / manifest["input"]["path"]).resolve() == scene.resolve():
+            with contextlib.suppress(OSError, ValueError, BakerError):
+                # Validation takes long, so skip the bakes of other scenes first.
+                text = read_regular(folder / MANIFEST_NAME, most=_MOST_BYTES)
+                if json.dumps(scene.name, ensure_ascii=False)[1:-1].encode() not in text:
+                    continue
+                manifest = read_manifest(folder)
+                if (folder / str(manifest["input"]["path"])).resolve() == scene.resolve():
                     found.append((str(manifest["created"]), folder.name, rates_of_bake(manifest)))
     if not found:
         return None

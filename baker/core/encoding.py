@@ -16,7 +16,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.errors import ResourceError
+from baker.core.errors import InputError, ResourceError
 from baker.core.registry import Registry
 from baker.core.settings_model import Settings
 
@@ -28,6 +28,8 @@ VISIBLE_STEP = 0.01
 BLACK = 0.01
 # Encoding of the files that every bake writes.
 ALWAYS_WRITTEN = "exr"
+# Largest width and height of an image that is read, pixels.
+LARGEST_SIDE = 16384
 # Rows of a page that `measure_loss` processes at once, to limit its memory.
 _ROWS = 256
 
@@ -145,6 +147,21 @@ class Encoding(ABC, Generic[Options]):
             If the file cannot be written.
         """
 
+    def size(self, path: Path) -> tuple[int, int] | None:
+        """Return width and height from the header of a file, so that large images need not be decoded.
+
+        Returns
+        -------
+        (int, int) or None
+            Pixels; None if this encoding cannot tell them.
+
+        Raises
+        ------
+        InputError
+            As `decode`.
+        """
+        return None
+
     @abstractmethod
     def decode(self, path: Path) -> DecodedImage:
         """Read a file of this format. The pixels equal the result of `stored` for the encoded pixels.
@@ -155,6 +172,21 @@ class Encoding(ABC, Generic[Options]):
             If the file cannot be read, is not an image of this format, or is truncated. If it is not an image
             of this format, the message contains "is not a readable".
         """
+
+
+def check_size(path: Path, width: int, height: int) -> None:
+    """Raise `InputError` if an image is empty or larger than `LARGEST_SIDE`, before its pixels are decoded.
+
+    Parameters
+    ----------
+    path : Path
+        File of the image, for the message.
+    width, height : int
+        Size that the header of the file states, pixels.
+    """
+    if not (1 <= width <= LARGEST_SIDE and 1 <= height <= LARGEST_SIDE):
+        message = f"its size is {width} x {height} pixels; at most {LARGEST_SIDE} a side are read"
+        raise InputError(message, file=str(path))
 
 
 @dataclass(frozen=True)

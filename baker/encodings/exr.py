@@ -20,7 +20,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels
+from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels, check_size
 from baker.core.errors import InputError, ResourceError
 from baker.core.settings_model import FILES, setting
 
@@ -33,8 +33,6 @@ REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 # Largest number of components of an image. Spherical harmonics up to order 1 in three colours have 12.
 MAX_COMPONENTS = 16
 
-# Largest width and height of an image that is read, pixels.
-_LARGEST = 16384
 # File descriptor of stderr. The lock is held while the descriptor is redirected.
 _STDERR = 2
 _PRINTING = threading.Lock()
@@ -140,17 +138,10 @@ def decode_exr(path: Path) -> DecodedImage:
     """
     import OpenEXR
 
-    if not path.is_file():
-        raise InputError("there is no such file", file=str(path))
-    try:
-        with _silent_library(), OpenEXR.File(str(path), header_only=True) as file:
-            _check_size(path, file.header()["dataWindow"])
-        with _silent_library(), OpenEXR.File(str(path), separate_channels=True) as file:
-            planes = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
-            header = {str(key): _text(value) for key, value in file.header().items() if key != "channels"}
-    # OpenEXR reports damaged files as RuntimeError or ValueError.
-    except (RuntimeError, ValueError, OSError) as error:
-        raise InputError(f"this is not a readable EXR image ({_first_line(error)})", file=str(path)) from None
+    exr_size(path)
+    with _readable(path), OpenEXR.File(str(path), separate_channels=True) as file:
+        planes = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
+        header = {str(key): _text(value) for key, value in file.header().items() if key != "channels"}
     names = sorted(planes, key=lambda name: ("RGBA".find(name) if name in "RGBA" else 4, name))
     if len({plane.shape for plane in planes.values()}) != 1:
         raise InputError("its channels are absent or differ in size", file=str(path))
@@ -159,16 +150,44 @@ def decode_exr(path: Path) -> DecodedImage:
     return DecodedImage(pixels, header, dtype, tuple(names))
 
 
-def _check_size(path: Path, window: Any) -> None:
-    """Raise an error if the data window of an image is empty or too large.
+def exr_size(path: Path) -> tuple[int, int]:
+    """Return width and height of an EXR file from its header.
 
-    `window` consists of the first and the last pixel (x, y), both inclusive.
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    (int, int)
+        Pixels.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or damaged, or larger than 16384 x 16384 pixels.
     """
-    low, high = (np.asarray(corner, np.int64) for corner in window)
+    import OpenEXR
+
+    if not path.is_file():
+        raise InputError("there is no such file", file=str(path))
+    with _readable(path), OpenEXR.File(str(path), header_only=True) as file:
+        # First and last pixel (x, y), both inclusive.
+        low, high = (np.asarray(corner, np.int64) for corner in file.header()["dataWindow"])
     width, height = (int(n) for n in high - low + 1)
-    if not (1 <= width <= _LARGEST and 1 <= height <= _LARGEST):
-        message = f"its size is {width} x {height} pixels; at most {_LARGEST} a side are read"
-        raise InputError(message, file=str(path))
+    check_size(path, width, height)
+    return width, height
+
+
+@contextlib.contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    """Convert the errors of OpenEXR about a damaged file to `InputError`, and print nothing."""
+    try:
+        with _silent_library():
+            yield
+    # OpenEXR reports damaged files as RuntimeError or ValueError.
+    except (RuntimeError, ValueError, OSError, KeyError) as error:
+        raise InputError(f"this is not a readable EXR image ({_first_line(error)})", file=str(path)) from None
 
 
 @contextlib.contextmanager
@@ -243,6 +262,10 @@ class ExrEncoding(Encoding[ExrOptions]):
         """Write pixels; see `encode_exr`."""
         half = options.dtype == "half"
         encode_exr(path, pixels, half=half, compression=options.exr_compression, header=header, names=names)
+
+    def size(self, path: Path) -> tuple[int, int]:
+        """Return width and height; see `exr_size`."""
+        return exr_size(path)
 
     def decode(self, path: Path) -> DecodedImage:
         """Read pixels; see `decode_exr`."""

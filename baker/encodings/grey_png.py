@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from baker.core.encoding import DecodedImage, Encoding, EncodingOptions, check_pixels, write_image
 from baker.core.errors import InputError
-from baker.io.png import decode_png, encode_png
+from baker.io.png import decode_png, encode_png, png_size
 
 
 class GreyPng(Encoding[EncodingOptions]):
@@ -69,6 +69,10 @@ class GreyPng(Encoding[EncodingOptions]):
         """
         check_pixels(pixels, self.components, path.name)
         write_image(path, encode_png(self._code(pixels)[:, :, 0], header))
+
+    def size(self, path: Path) -> tuple[int, int]:
+        """Return width and height; see `png_size`."""
+        return png_size(path)
 
     def decode(self, path: Path) -> DecodedImage:
         """Read a file.

@@ -8,13 +8,22 @@ Based on: G. Ward, Real Pixels, Graphics Gems II, 1991; the Radiance picture fil
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels, write_image
+from baker.core.encoding import (
+    ENCODINGS,
+    DecodedImage,
+    Encoding,
+    EncodingOptions,
+    check_pixels,
+    check_size,
+    write_image,
+)
 from baker.core.errors import InputError
 from baker.io.regular_file import read_regular
 
@@ -67,6 +76,12 @@ class HdrEncoding(Encoding[EncodingOptions]):
         check_pixels(pixels, self.components, path.name)
         write_image(path, hdr_file(pixels, header))
 
+    def size(self, path: Path) -> tuple[int, int]:
+        """Return width and height."""
+        with _readable(path):
+            _, height, width, _ = _read_head(read_regular(path))
+        return width, height
+
     def decode(self, path: Path) -> DecodedImage:
         """Read a file.
 
@@ -75,16 +90,11 @@ class HdrEncoding(Encoding[EncodingOptions]):
         InputError
             If the file is missing, damaged or not Radiance RGBE.
         """
-        try:
+        with _readable(path):
             data = read_regular(path)
-        except OSError as error:
-            raise InputError(f"the image cannot be read ({error.strerror})", file=str(path)) from None
-        try:
             header, height, width, at = _read_head(data)
+            check_size(path, width, height)
             rgbe = _decoded(data, at, height, width)
-        except (ValueError, IndexError) as error:
-            message = f"this is not a readable Radiance HDR image ({error})"
-            raise InputError(message, file=str(path)) from None
         return DecodedImage(_from_rgbe(rgbe), header, "uint", ("R", "G", "B"))
 
 
@@ -115,6 +125,18 @@ def hdr_file(pixels: NDArray[np.float32], header: Mapping[str, str]) -> bytes:
     rgbe = _to_rgbe(pixels)
     body = [_coded(row) for row in rgbe] if width in _CODED else [rgbe.tobytes()]
     return head.encode("utf-8") + b"".join(body)
+
+
+@contextlib.contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    """Convert errors about a damaged or missing file to `InputError`."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"the image cannot be read ({error.strerror})", file=str(path)) from None
+    except (ValueError, IndexError) as error:
+        message = f"this is not a readable Radiance HDR image ({error})"
+        raise InputError(message, file=str(path)) from None
 
 
 def _to_rgbe(pixels: NDArray[np.float32]) -> NDArray[np.uint8]:

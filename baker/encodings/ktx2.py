@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels, write_image
 from baker.core.version import VERSION
-from baker.io.ktx2 import decode_ktx2, encode_ktx2
+from baker.io.ktx2 import decode_ktx2, encode_ktx2, ktx2_size
 
 _MANTISSA_BITS, _BIAS = 9, 15
 # Largest value: mantissa 511 with exponent 31.
@@ -68,6 +68,10 @@ class Ktx2Encoding(Encoding[EncodingOptions]):
         """
         check_pixels(pixels, self.components, path.name)
         write_image(path, encode_ktx2(_to_rgb9e5(pixels), header, f"baker {VERSION}"))
+
+    def size(self, path: Path) -> tuple[int, int]:
+        """Return width and height; see `ktx2_size`."""
+        return ktx2_size(path)
 
     def decode(self, path: Path) -> DecodedImage:
         """Read a file.

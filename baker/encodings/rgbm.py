@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels, write_image
 from baker.core.errors import InputError, SettingsError
 from baker.core.settings_model import FILES, Text, setting
-from baker.io.png import decode_png, encode_png
+from baker.io.png import decode_png, encode_png, png_size
 
 GAMMA = 2.2
 
@@ -110,6 +110,10 @@ class RgbmEncoding(Encoding[RgbmOptions]):
         about = {**header, "rgbm": "value = top * (rgb * a)^gamma", "top": repr(options.top)}
         data = encode_png(_to_rgbm(pixels, options.top), {**about, "gamma": repr(GAMMA)})
         write_image(path, data)
+
+    def size(self, path: Path) -> tuple[int, int]:
+        """Return width and height; see `png_size`."""
+        return png_size(path)
 
     def decode(self, path: Path) -> DecodedImage:
         """Read a file whose text chunks contain `top` and `gamma`.

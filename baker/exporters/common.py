@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from baker.core.encoding import DecodedImage, encoding_of
+from baker.io.gltf.packer import objects
 
 MANIFEST_NAME = "bake.json"
 SCENE_NAME = "scene.glb"
@@ -181,7 +182,7 @@ def place_named_scene(bake: Path, target: Path, change: Change | None = None) ->
         document, binary = _read_document(file), file.read()
     _replace_lights(document)
     nodes = document.get("nodes", [])
-    for index, node in enumerate(nodes):
+    for index, node in objects(document, "nodes"):
         node["name"] = unique_name(str(node.get("name", "node")), index)
         extras = node.setdefault("extras", {})
         if isinstance(extras, dict):
@@ -218,8 +219,9 @@ def _replace_lights(document: dict[str, Any]) -> bool:
 
     Loaders refuse a file with an unknown type. The pages contain the light of all lights.
     """
-    table = document.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", [])
-    foreign = [number for number, light in enumerate(table) if light.get("type") not in STANDARD_LIGHTS]
+    holder = document.get("extensions", {}).get("KHR_lights_punctual", {})
+    foreign = [n for n, light in objects(holder, "lights") if light.get("type") not in STANDARD_LIGHTS]
+    table = holder.get("lights", [])
     for number in foreign:
         name = {"name": table[number]["name"]} if "name" in table[number] else {}
         table[number] = {**name, "type": "point", "intensity": 0.0}

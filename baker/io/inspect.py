@@ -98,8 +98,8 @@ def _status(path: Path) -> dict[str, Any] | None:
         # Recognise the file by the text chunk `Legend`, which only status images have.
         if b"tEXtLegend\x00" not in data:
             return None
-        index = decode_palette_png(data)
-    except (OSError, ValueError):
+        index = decode_palette_png(path)
+    except (OSError, ValueError, InputError):
         return None
     count = np.bincount(index.ravel(), minlength=len(TexelStatus))
     if count[len(TexelStatus) :].any():

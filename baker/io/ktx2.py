@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import struct
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -89,12 +90,43 @@ def decode_ktx2(path: Path) -> tuple[NDArray[np.uint32], dict[str, str]]:
         If the file is missing, damaged or not KTX2, or if it is not a two-dimensional image with shared
         exponents.
     """
+    with _readable(path):
+        return _decoded(read_regular(path))
+
+
+def ktx2_size(path: Path) -> tuple[int, int]:
+    """Return width and height of a KTX2 file from its header.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    (int, int)
+        Texels.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or not KTX2.
+    """
+    with _readable(path):
+        data = read_regular(path, first=_HEAD.size)
+        if not data.startswith(_IDENTIFIER):
+            raise ValueError("no KTX2 identifier")
+        width, height = _HEAD.unpack_from(data)[3:5]
+    return width, height
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    """Convert errors about a damaged or missing file to `InputError`."""
     try:
-        data = read_regular(path)
+        yield
     except OSError as error:
         raise InputError(f"the image cannot be read ({error.strerror})", file=str(path)) from None
-    try:
-        return _decoded(data)
     except (ValueError, struct.error) as error:
         raise InputError(f"this is not a readable KTX2 image ({error})", file=str(path)) from None
 

@@ -6,14 +6,20 @@ No time stamp is written, so that equal pixels give equal bytes.
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.encoding import check_size
 from baker.core.errors import InputError
+from baker.io.regular_file import read_regular
+
+if TYPE_CHECKING:
+    from PIL.PngImagePlugin import PngImageFile
 
 
 def encode_png(pixels: NDArray[np.unsignedinteger[Any]], text: Mapping[str, str] | None = None) -> bytes:
@@ -58,20 +64,12 @@ def decode_png(path: Path) -> tuple[NDArray[np.unsignedinteger[Any]], dict[str, 
     InputError
         If the file is missing, is no PNG, or has a palette or another unsupported pixel type.
     """
-    from PIL import Image, PngImagePlugin, UnidentifiedImageError
-
-    try:
-        with Image.open(path, formats=["PNG"]) as image:
-            image.load()
-            assert isinstance(image, PngImagePlugin.PngImageFile)
-            if image.mode not in ("L", "RGB", "RGBA", "I;16", "I"):
-                raise InputError(f"its pixels are of the kind {image.mode}", file=str(path))
-            pixels = np.array(image)
-            text = {str(key): str(value) for key, value in image.text.items()}
-    except FileNotFoundError:
-        raise InputError("there is no such file", file=str(path)) from None
-    except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
-        raise InputError(f"this is not a readable PNG image ({error})", file=str(path)) from None
+    with _opened(path) as image:
+        image.load()
+        if image.mode not in ("L", "RGB", "RGBA", "I;16", "I"):
+            raise InputError(f"its pixels are of the kind {image.mode}", file=str(path))
+        pixels = np.array(image)
+        text = {str(key): str(value) for key, value in image.text.items()}
     return (pixels.astype(np.uint16) if pixels.dtype != np.uint8 else pixels), text
 
 
@@ -136,23 +134,73 @@ def srgb_levels(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
     return np.rint(encoded * 255.0).astype(np.uint8)
 
 
-def decode_palette_png(data: bytes) -> NDArray[np.uint8]:
-    """Return (H, W) uint8: the palette index of each pixel of a PNG with a palette, row 0 at the top.
+def decode_palette_png(path: Path, side: int | None = None) -> NDArray[np.uint8]:
+    """Return the palette index of each pixel of a PNG with a palette.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    side : int, optional
+        Required width and height, checked before the pixels are decoded.
+
+    Returns
+    -------
+    (H, W) uint8
+        Row 0 at the top.
 
     Raises
     ------
-    ValueError
-        If the data is no image with a palette.
+    InputError
+        If the file is missing, is no PNG with a palette, or has another size.
     """
-    from PIL import Image, UnidentifiedImageError
+    with _opened(path) as image:
+        if image.mode != "P" or (side is not None and image.size != (side, side)):
+            size = "" if side is None else f" of {side} x {side} texels"
+            raise InputError(f"the picture has no palette numbers{size}", file=str(path))
+        return np.array(image, np.uint8)
+
+
+def png_size(path: Path) -> tuple[int, int]:
+    """Return width and height of a PNG from its header.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    (int, int)
+        Pixels.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, is no PNG, or is larger than 16384 x 16384 pixels.
+    """
+    with _opened(path) as image:
+        return image.size
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[PngImageFile]:
+    """Yield a PNG whose size is permitted; convert errors about the file to `InputError`."""
+    # `Image.open` would warn about images above 89 million pixels and refuse those above 178 million.
+    from PIL.PngImagePlugin import PngImageFile
 
     try:
-        with Image.open(io.BytesIO(data)) as image:
-            if image.mode != "P":
-                raise ValueError("the picture has no palette")
-            return np.array(image, np.uint8)
-    except (UnidentifiedImageError, OSError, SyntaxError) as error:
-        raise ValueError(str(error)) from None
+        with PngImageFile(io.BytesIO(read_regular(path))) as image:
+            check_size(path, *image.size)
+            yield image
+    except FileNotFoundError:
+        raise InputError("there is no such file", file=str(path)) from None
+    except (OSError, SyntaxError, ValueError, EOFError) as error:
+        raise InputError(f"this is not a readable PNG image ({_reason(error)})", file=str(path)) from None
+
+
+def _reason(error: Exception) -> str:
+    return str(getattr(error, "strerror", None) or error)
 
 
 def _chunks(text: Mapping[str, str]) -> Any:

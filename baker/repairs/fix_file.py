@@ -18,7 +18,9 @@ from baker.core.source_mesh import SourceInstance, SourceMesh, SourcePrimitive, 
 from baker.core.stage import Stage
 from baker.io.gltf.ao_materials import material_holders, reads_texcoord_1, reads_texture
 from baker.io.gltf.edited_primitive import EditedPrimitive, ReplacedPrimitive
+from baker.io.gltf.packer import objects
 from baker.io.gltf.primitive_columns import read_columns, why_locked
+from baker.io.gltf.uri import is_data
 from baker.io.gltf.write_fixed import write_fixed
 from baker.io.gltf.write_source import source_glb
 from baker.io.load import IMPORTERS, SceneFile, load_scene, read_scene_file
@@ -250,8 +252,8 @@ def _shown_meshes(source_scene: SourceScene) -> Iterator[tuple[int, SourceMesh, 
 
 def _names_files(source: SourceDocument) -> bool:
     """Return whether a glTF document refers to other files."""
-    things = [*source.json.get("images", []), *source.json.get("buffers", [])]
-    return any("uri" in thing and not thing["uri"].startswith("data:") for thing in things)
+    uris = (thing.get("uri") for key in ("images", "buffers") for _, thing in objects(source.json, key))
+    return any(isinstance(uri, str) and not is_data(uri) for uri in uris)
 
 
 def _read_glb(path: Path, data: bytes, *, allow_outside: bool) -> Scene:

@@ -11,6 +11,9 @@ from baker.kernels.shading import Shading
 from baker.kernels.textures import PackImage, pack_textures
 from baker.shading.alpha import build_alpha
 
+# Largest base colour. A valid base colour is at most 1; with much larger ones, sums over bounces overflow.
+LARGEST_ALBEDO = 100.0
+
 
 def resolve_materials(scene: Scene, geometry: Geometry, *, reflections: bool = False) -> Shading:
     """Pack the textures of all materials, and compute the image uv of every lightmap vertex.
@@ -43,6 +46,7 @@ def resolve_materials(scene: Scene, geometry: Geometry, *, reflections: bool = F
             images.append(PackImage(texture.image, texture.wrap, sharp, linear))
         return numbers[key]
 
+    base = np.array([m.base_colour[:3] for m in scene.materials], np.float64).reshape(-1, 3)
     base_texture = np.array([number(m.base_colour_texture) for m in scene.materials], np.int32)
     emission_texture = np.array([number(m.emission_texture, sharp=True) for m in scene.materials], np.int32)
     glossy = [m.metallic_roughness_texture if reflections else None for m in scene.materials]
@@ -51,7 +55,7 @@ def resolve_materials(scene: Scene, geometry: Geometry, *, reflections: bool = F
     base_uv = corner_uv(scene, geometry, [m.base_colour_texture for m in scene.materials])
     return Shading(
         pack=pack,
-        base=np.array([m.base_colour[:3] for m in scene.materials], np.float32).reshape(-1, 3),
+        base=np.minimum(base, LARGEST_ALBEDO).astype(np.float32),
         emission=np.array([m.emission for m in scene.materials], np.float32).reshape(-1, 3),
         base_texture=base_texture,
         emission_texture=emission_texture,

@@ -14,7 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.io.bake.output_folder import own_files
+from baker.channels.channel import CHANNELS
+from baker.core.errors import InputError
+from baker.core.names import unknown_name
+from baker.io.bake.output_folder import MANIFEST_NAME, own_files
 from baker.io.bake.read_bake import StoredBake
 from baker.viewer.page_data import page_numbers
 from baker.viewer.scene_data import scene_data
@@ -53,7 +56,16 @@ def page_answers(bake: StoredBake, three: ThreeScript) -> dict[str, Answer]:
     -------
     dict of str to Answer
         Media type of each address, and the function that returns its bytes.
+
+    Raises
+    ------
+    InputError
+        If the manifest names an unknown channel.
     """
+    for name in bake.maps:
+        if CHANNELS.get(name) is None:
+            file = str(bake.folder / MANIFEST_NAME)
+            raise unknown_name("channel", name, CHANNELS.names(), file=file, error=InputError)
     data = scene_data(bake)
     header = {**data.header, "three": {"file": f"three/{three.path.name}", "module": three.module}}
     text = json.dumps(header, allow_nan=False).encode()

@@ -49,6 +49,8 @@ def export_page(bake: StoredBake, three: ThreeScript, folder: Path) -> list[str]
 
     Raises
     ------
+    InputError
+        If the manifest names an unknown channel.
     SettingsError
         If `folder` is a file, holds other files, or cannot be replaced.
     ResourceError

@@ -71,6 +71,8 @@ def make_server(bake: StoredBake, three: ThreeScript, *, port: int = 0) -> ViewS
 
     Raises
     ------
+    InputError
+        If the manifest names an unknown channel.
     ResourceError
         If the port is in use or not permitted.
     """

@@ -57,6 +57,15 @@ def image(encoding, options, number, height=23, width=70, seed=5):
     return np.clip(pixels, low, high).astype(np.float32)
 
 
+@pytest.mark.parametrize("name", ENCODINGS.names())
+def test_the_header_tells_the_size(tmp_path, name):
+    encoding = ENCODINGS.get(name)
+    path = tmp_path / f"a{encoding.suffix}"
+    options = fitted(encoding)
+    encoding.encode(path, image(encoding, options, encoding.components[0]), options=options, header=HEADER)
+    assert encoding.size(path) == (70, 23)
+
+
 @pytest.mark.parametrize(("name", "number", "options"), CASES)
 def test_a_file_holds_every_value_within_the_stated_tolerance(tmp_path, name, number, options):
     encoding = ENCODINGS.get(name)

@@ -50,7 +50,7 @@ class Page:
         self.window, self.url, self.out = window, url, out
         self.light = np.stack([decode_exr(out / f"irradiance_{k}.exr").pixels for k in (0, 1)])
         self.ao = np.stack([decode_exr(out / f"ao_{k}.exr").pixels for k in (0, 1)])
-        self.status = np.stack([decode_palette_png((out / f"status_{k}.png").read_bytes()) for k in (0, 1)])
+        self.status = np.stack([decode_palette_png(out / f"status_{k}.png") for k in (0, 1)])
         covered = np.isin(self.status, (1, 3, 4))
         self.exposure = MIDDLE / np.median(self.light[covered] @ LUMINANCE)
 

@@ -22,7 +22,6 @@ from baker.io.bake.read_manifest import read_manifest
 from baker.io.choose import choose_objects
 from baker.io.load import load_scene
 from baker.io.png import decode_palette_png
-from baker.io.regular_file import read_regular
 
 SCENE_NAME = "scene.glb"
 
@@ -139,12 +138,11 @@ def _pages(folder: Path, manifest: dict[str, Any], channel: str) -> NDArray[np.f
         encoding = encoding_of(path.name)
         if encoding is None:
             raise InputError(f"'{path.suffix}' is not a known image format", file=str(path))
+        wanted = (entry["width"], entry["height"])
+        _check_size(path, encoding.size(path), wanted)
         image = encoding.decode(path)
         pixels = image.pixels
-        if pixels.shape[:2] != (entry["height"], entry["width"]):
-            height, width = pixels.shape[:2]
-            message = f"the map is {width} x {height}, the manifest says {entry['width']} x {entry['height']}"
-            raise InputError(message, file=str(path))
+        _check_size(path, (pixels.shape[1], pixels.shape[0]), wanted)
         if components is not None and components != list(image.channels):
             if sorted(components) != sorted(image.channels):
                 message = f"the map has the channels {', '.join(image.channels)}"
@@ -152,6 +150,13 @@ def _pages(folder: Path, manifest: dict[str, Any], channel: str) -> NDArray[np.f
             pixels = pixels[:, :, [image.channels.index(name) for name in components]]
         images.append(pixels)
     return np.stack(images)
+
+
+def _check_size(path: Path, found: tuple[int, int] | None, wanted: tuple[int, int]) -> None:
+    """Raise `InputError` if the size of a map is not (width, height) of the manifest."""
+    if found is not None and found != wanted:
+        message = f"the map is {found[0]} x {found[1]}, the manifest says {wanted[0]} x {wanted[1]}"
+        raise InputError(message, file=str(path))
 
 
 def _layout(folder: Path, scene: Scene, index: int, row: dict[str, Any] | None) -> InstanceLayout:
@@ -177,10 +182,6 @@ def _layout(folder: Path, scene: Scene, index: int, row: dict[str, Any] | None) 
 def _status(folder: Path, page: int, resolution: int) -> NDArray[np.uint8]:
     path = _present(folder, f"status_{page}.png")
     try:
-        status = decode_palette_png(read_regular(path))
-    except (OSError, ValueError):
-        raise InputError("the file is not a readable PNG; bake the scene again", file=str(path)) from None
-    if status.shape != (resolution, resolution):
-        message = f"the picture is not {resolution} x {resolution} palette numbers; bake the scene again"
-        raise InputError(message, file=str(path))
-    return status
+        return decode_palette_png(path, resolution)
+    except InputError as error:
+        raise InputError(f"{error.message}; bake the scene again", file=str(path)) from None

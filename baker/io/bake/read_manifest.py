@@ -37,7 +37,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     -------
     dict
         The manifest, valid by the schema. All page numbers exist. No node and no file occurs twice. Every
-        file name is a path inside the folder. The numbers of each instance are finite.
+        file name is a path inside the folder. The numbers of instances, timings and rays are finite.
 
     Raises
     ------
@@ -91,7 +91,8 @@ def _short(text: str) -> str:
 
 def _check_consistency(manifest: dict[str, Any]) -> None:
     """Raise ValueError if a manifest that is valid by the schema contradicts itself."""
-    _finite(manifest["instances"], "instances")
+    for key in ("instances", "timings", "rays"):
+        _finite(manifest[key], key)
     by_channel: dict[str, list[int]] = {}
     sizes = set()
     for page in manifest["pages"]:

@@ -103,6 +103,9 @@ HARMLESS: dict[str, Callable[[dict[str, Any]], None]] = {
     "a base colour of 1e30": lambda document: document.setdefault("materials", [{}])[0].update(
         pbrMetallicRoughness={"baseColorFactor": [1e30, 1e30, 1e30, 1]}
     ),
+    "base colours of 1e8 to 1e300": lambda document: document.setdefault("materials", [{}])[0].update(
+        pbrMetallicRoughness={"baseColorFactor": [1e8, 1e20, 1e300, 1]}
+    ),
     "an alpha cutoff of 1e30 without MASK": lambda document: document.setdefault("materials", [{}])[0].update(
         alphaCutoff=1e30
     ),

@@ -54,6 +54,14 @@ def test_a_defect_that_is_not_fixed_is_named_and_nothing_is_written(builder, wor
     assert sorted(p.name for p in tmp_path.iterdir() if p.is_file()) == ["old.glb", "scene.glb"]
 
 
+@pytest.mark.parametrize("images", [[1e20], [{"uri": 5}], [{"uri": []}, None]])
+def test_unused_images_of_any_type_do_not_stop_a_fix(images, tmp_path):
+    builder = quad_builder()
+    builder.json["images"] = images
+    fix(write(tmp_path / "scene.glb", builder), tmp_path / "fixed.glb")
+    assert (tmp_path / "fixed.glb").exists()
+
+
 def broken(data: bytes, change) -> bytes:
     size = struct.unpack_from("<I", data, 12)[0]
     document = json.loads(data[20 : 20 + size])

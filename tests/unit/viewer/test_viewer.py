@@ -210,3 +210,11 @@ def test_names_stay_inside_the_page(out):
         assert not any(word in text for word in ("innerHTML", "outerHTML", "insertAdjacentHTML", "eval(")), (
             path
         )
+
+
+def test_a_channel_that_baker_does_not_know_is_refused(tmp_path):
+    out = make_bake(tmp_path, name="hall")
+    text = (out / "bake.json").read_text("utf-8")
+    (out / "bake.json").write_text(text.replace('"channel": "ao"', '"channel": "aoo"'), "utf-8")
+    with pytest.raises(InputError, match="no channel 'aoo'; did you mean 'ao'"):
+        make_server(read_bake(out), find_three(None))

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
 import pytest
 from io_scenes import quad_result
 
+from baker.core.encoding import ENCODINGS
 from baker.core.errors import InputError
 from baker.io.bake.read_bake import read_bake
 from baker.io.bake.write_bake import write_bake
@@ -82,3 +85,34 @@ def test_a_broken_folder_is_refused_by_file(out: Path, name: str, content: bytes
 def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such folder"):
         read_bake(tmp_path / "nothing")
+
+
+def png_header(width: int, height: int) -> bytes:
+    """Return the first chunk of a PNG with a palette, without its pixels."""
+    chunk = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 3, 0, 0, 0)
+    end = struct.pack(">II", zlib.crc32(chunk), 0) + b"IDAT" + struct.pack(">I", zlib.crc32(b"IDAT"))
+    return b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + chunk + end
+
+
+@pytest.mark.parametrize(
+    ("width", "said"),
+    [(64, "no palette numbers of 16 x 16"), (30_000, "30000 x 30000 pixels; at most 16384")],
+)
+def test_the_size_of_status_pages_is_checked_before_they_are_decoded(
+    out: Path, monkeypatch: pytest.MonkeyPatch, width: int, said: str
+) -> None:
+    (out / "status_0.png").write_bytes(png_header(width, width))
+    monkeypatch.setattr("PIL.PngImagePlugin.PngImageFile.load", None)
+    with pytest.raises(InputError, match=said):
+        read_bake(out)
+
+
+def test_the_size_of_maps_is_checked_before_they_are_decoded(
+    out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    exr = ENCODINGS.require("exr", "encoding")
+    pixels = np.zeros((16, 32, 3), np.float32)
+    exr.encode(out / "irradiance_0.exr", pixels, options=exr.options_type(), header={})
+    monkeypatch.setattr(type(exr), "decode", lambda *_: pytest.fail("decoded"))
+    with pytest.raises(InputError, match="the map is 32 x 16, the manifest says 16 x 16"):
+        read_bake(out)
