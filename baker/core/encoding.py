@@ -175,7 +175,7 @@ class Encoding(ABC, Generic[Options]):
 
 
 def check_size(path: Path, width: int, height: int) -> None:
-    """Raise `InputError` if an image is empty or larger than `LARGEST_SIDE`, before its pixels are decoded.
+    """Refuse empty and very large images before their pixels are decoded.
 
     Parameters
     ----------
@@ -183,6 +183,11 @@ def check_size(path: Path, width: int, height: int) -> None:
         File of the image, for the message.
     width, height : int
         Size that the header of the file states, pixels.
+
+    Raises
+    ------
+    InputError
+        If width or height is 0 or above `LARGEST_SIDE`.
     """
     if not (1 <= width <= LARGEST_SIDE and 1 <= height <= LARGEST_SIDE):
         message = f"its size is {width} x {height} pixels; at most {LARGEST_SIDE} a side are read"
