@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,10 +114,7 @@ def ktx2_size(path: Path) -> tuple[int, int]:
         If the file is missing or not KTX2.
     """
     with _readable(path):
-        data = read_regular(path, first=_HEAD.size)
-        if not data.startswith(_IDENTIFIER):
-            raise ValueError("no KTX2 identifier")
-        width, height = _HEAD.unpack_from(data)[3:5]
+        width, height = _head(read_regular(path, first=_HEAD.size))[3:5]
     return width, height
 
 
@@ -131,10 +129,14 @@ def _readable(path: Path) -> Iterator[None]:
         raise InputError(f"this is not a readable KTX2 image ({error})", file=str(path)) from None
 
 
-def _decoded(data: bytes) -> tuple[NDArray[np.uint32], dict[str, str]]:
+def _head(data: bytes) -> tuple[Any, ...]:
     if not data.startswith(_IDENTIFIER):
         raise ValueError("no KTX2 identifier")
-    _, kind, _, width, height, depth, layers, faces, _, scheme, *parts = _HEAD.unpack_from(data)
+    return _HEAD.unpack_from(data)
+
+
+def _decoded(data: bytes) -> tuple[NDArray[np.uint32], dict[str, str]]:
+    _, kind, _, width, height, depth, layers, faces, _, scheme, *parts = _head(data)
     if kind != _FORMAT or depth or layers > 1 or faces != 1:
         raise ValueError(f"only flat images of format {_FORMAT} are read; its format is {kind}")
     if scheme not in (_UNCOMPRESSED, _ZSTANDARD):

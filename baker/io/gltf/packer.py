@@ -46,7 +46,20 @@ def is_index(value: object) -> TypeGuard[int]:
 
 
 def objects(document: Json, key: str) -> Iterator[tuple[int, Json]]:
-    """Yield the objects in the list under `key` with their indices; skip elements that are no objects."""
+    """Yield the objects in a list of a document; skip elements that are no objects.
+
+    Parameters
+    ----------
+    document : dict
+        The document, or another object with lists.
+    key : str
+        Key of the list.
+
+    Yields
+    ------
+    (int, dict)
+        Index and object.
+    """
     items = document.get(key)
     if isinstance(items, list):
         yield from ((number, item) for number, item in enumerate(items) if isinstance(item, dict))

@@ -21,7 +21,18 @@ class UriError(Exception):
 
 
 def is_data(uri: str) -> bool:
-    """Return whether the URI is a data URI."""
+    """Return whether a URI contains the data.
+
+    Parameters
+    ----------
+    uri : str
+        The URI.
+
+    Returns
+    -------
+    bool
+        Whether it is a data URI.
+    """
     return uri[:5].lower() == "data:"
 
 
