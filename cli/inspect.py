@@ -9,7 +9,7 @@ import typer
 
 from baker.cli.command import Run, command
 from baker.core.printable import printable
-from baker.core.settings import InspectSettings
+from baker.io.settings import InspectSettings
 
 # Largest number of items of a list that are shown without -v and --json. For further items, their number is
 # shown.

@@ -47,7 +47,7 @@ def test_packages_name_what_their_kernels_are_made_of(texts, imports):
     assert {
         "baker.radiosity.kernels.gather",
         "baker.pathtracer.paths",
-        "baker.lights.kinds.spot",
+        "baker.lights.shadow_rays",
     } <= kernels
     named = {}
     for name, text in texts.items():

@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from baker.core.scene import Scene
-from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
+
+if TYPE_CHECKING:
+    from baker.core.settings import BakeSettings
 
 # Patches are the blocks of texels that radiosity treats as one surface element. This is the largest number of
 # patches outside narrow gaps, and also the largest number inside them. Blocks are enlarged until the numbers

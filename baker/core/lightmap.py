@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from enum import IntEnum
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from baker.core.atlas import Atlas
 from baker.core.result import Result
 from baker.core.scene import Scene, SceneWarning
-from baker.core.settings import BakeSettings
+
+if TYPE_CHECKING:
+    from baker.core.settings import BakeSettings
 
 
 class TexelStatus(IntEnum):

@@ -14,12 +14,12 @@ from baker.core.errors import SettingsError
 from baker.core.light_limits import BRIGHTEST
 from baker.core.settings_model import (
     FILES,
+    SCENE,
     Names,
     Numbers,
-    RunSettings,
     Settings,
     Text,
-    same_setting,
+    allow_outside_setting,
     seed_setting,
     setting,
     threads_setting,
@@ -27,7 +27,7 @@ from baker.core.settings_model import (
 
 # Titles of the groups of the settings in the help. `BAKE` contains the settings that are changed most often.
 BAKE, LIGHT, OCCLUSION = "Bake", "Light and noise", "Ambient occlusion"
-PAGES, SCENE = "Lightmap uv and pages", "Scene"
+PAGES = "Lightmap uv and pages"
 # Hemisphere rays per texel of each preset. They are also the default of `light_samples` and `ao_samples`.
 QUALITY_SAMPLES = {"preview": 16, "medium": 64, "high": 256, "ultra": 1024}
 
@@ -113,9 +113,7 @@ class CommonSettings(Settings):
         allow_inf_nan=False,
         group=SCENE,
     )
-    allow_outside: bool = setting(
-        False, "Also read referenced files outside the scene's folder.", group=SCENE
-    )
+    allow_outside: bool = allow_outside_setting()
     seed: int = seed_setting()
     threads: int | None = threads_setting()
 
@@ -155,12 +153,6 @@ else:
 
     class BakeSettings(*reversed(encoding_options().values()), CommonSettings):
         """All settings of a bake: the common settings and the options of each encoding."""
-
-
-class InspectSettings(RunSettings):
-    """The settings of `baker inspect`."""
-
-    allow_outside: bool = same_setting(BakeSettings, "allow_outside")
 
 
 def ao_metres(distance: str, diagonal: float) -> float:

@@ -18,9 +18,9 @@ from baker.core.names import unknown_setting
 
 # Number of characters of an invalid value that an error quotes.
 _LONGEST = 80
-# Titles of groups of settings in the help: settings that every command has, and settings of the files that a
-# bake writes.
-RUN, FILES = "Run", "Files"
+# Titles of groups of settings in the help: settings that every command has, settings of the files that a bake
+# writes, and settings of reading scene files.
+RUN, FILES, SCENE = "Run", "Files", "Scene"
 
 
 def setting(
@@ -246,6 +246,17 @@ def threads_setting() -> Any:
         For `threads: int | None`.
     """
     return setting(None, "Number of threads; default: all cores.", group=RUN, ge=1, le=1024)
+
+
+def allow_outside_setting() -> Any:
+    """Return the field `allow_outside`, which all commands that read scene files share.
+
+    Returns
+    -------
+    FieldInfo
+        For `allow_outside: bool`.
+    """
+    return setting(False, "Also read referenced files outside the scene's folder.", group=SCENE)
 
 
 class RunSettings(Settings):

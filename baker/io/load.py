@@ -10,16 +10,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Real
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from baker.core.error_mapping import memory_errors
 from baker.core.errors import InputError, SettingsError
 from baker.core.light_limits import check_brightness
 from baker.core.registry import Registry
 from baker.core.scene import Scene
-from baker.core.settings import BakeSettings
 from baker.io.choose import choose_objects
 from baker.io.regular_file import read_regular
 from baker.io.scene_folder import SceneFolder
+
+if TYPE_CHECKING:
+    from baker.core.settings import BakeSettings
 
 
 @dataclass(frozen=True)

@@ -12,15 +12,17 @@ import platform
 from datetime import UTC, datetime
 from importlib import metadata, resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from baker.core.light_kind import kind_of
 from baker.core.lightmap import BakeResult, Lightmap
 from baker.core.scene import SceneWarning
-from baker.core.settings import BakeSettings
 from baker.core.version import VERSION as BAKER_VERSION
+
+if TYPE_CHECKING:
+    from baker.core.settings import BakeSettings
 
 # Version of the manifest's layout; it changes when the name or the meaning of a key changes.
 VERSION = 1

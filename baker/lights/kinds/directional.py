@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from baker.core.light_kind import LIGHT_KINDS, EmissionProfile, LightJson, LightKind
 from baker.core.scene import PunctualLight
-from baker.trace.jit import kernel, larger
 
 
 def _read(light: LightJson, world_from_light: NDArray[np.float64]) -> dict[str, Any]:
@@ -36,27 +35,9 @@ def _fill(
     ray: NDArray[np.float32],
     weight: NDArray[np.float32],
 ) -> None:
-    _fill_parallel(np.array(light.direction, np.float64), normal, ray, weight)
+    from baker.lights.shadow_rays import fill_parallel
 
-
-@kernel
-def _fill_parallel(direction, normal, ray, weight):  # type: ignore[no-untyped-def]
-    """Write shadow rays towards a directional light, and the weights cos(theta).
-
-    direction : (3,) float64, unit vector in which the light travels, world
-    normal : (n, 16, 3), ray : (n, 16, 4), weight : (n, 16) float32, see `FillRays`
-    """
-    for i in range(ray.shape[0]):
-        for k in range(ray.shape[1]):
-            for a in range(3):
-                ray[i, k, a] = -direction[a]
-            ray[i, k, 3] = 1.0e30
-            cosine = -(
-                direction[0] * normal[i, k, 0]
-                + direction[1] * normal[i, k, 1]
-                + direction[2] * normal[i, k, 2]
-            )
-            weight[i, k] = larger(cosine, 0.0)
+    fill_parallel(np.array(light.direction, np.float64), normal, ray, weight)
 
 
 def _emission(light: PunctualLight) -> EmissionProfile:

@@ -15,10 +15,6 @@ from numpy.typing import NDArray
 
 from baker.core.light_kind import LIGHT_KINDS, EmissionProfile, LightJson, LightKind
 from baker.core.scene import PunctualLight
-from baker.trace.jit import inner, kernel, larger
-
-# TFAR of shadow rays, as a share of the distance to the light: the rays end just before the light.
-_SHORT = np.float32(0.99999)
 
 
 def read_range(light: LightJson) -> float:
@@ -80,37 +76,10 @@ def _fill(
     ray: NDArray[np.float32],
     weight: NDArray[np.float32],
 ) -> None:
+    from baker.lights.shadow_rays import fill_inverse_square
+
     position = np.array(light.position, np.float64)
     fill_inverse_square(position, light.inverse_range, origin, normal, ray, weight)
-
-
-@inner
-def range_window(square, inverse_range):  # type: ignore[no-untyped-def]
-    """Return clamp(1 - (r / range)^4, 0, 1).
-
-    square : r^2, square of the distance; inverse_range : 1 / range^2, 0 without a range
-    """
-    share = square * inverse_range
-    return larger(1.0 - share * share, 0.0)
-
-
-@kernel
-def fill_inverse_square(position, inverse_range, origin, normal, ray, weight):  # type: ignore[no-untyped-def]
-    """Write shadow rays to a light at `position`, and the weights cos / r^2 times `range_window`.
-
-    position : (3,) float64, metres, in the same space as `origin`
-    inverse_range : float, 1 / range^2, 0 without a range, see `PunctualLight.inverse_range`
-    origin, normal : (n, 16, 3), ray : (n, 16, 4), weight : (n, 16) float32, see `FillRays`
-    """
-    for i in range(origin.shape[0]):
-        for k in range(origin.shape[1]):
-            dx = position[0] - origin[i, k, 0]
-            dy = position[1] - origin[i, k, 1]
-            dz = position[2] - origin[i, k, 2]
-            square = larger(dx * dx + dy * dy + dz * dz, 1.0e-20)
-            cosine = (dx * normal[i, k, 0] + dy * normal[i, k, 1] + dz * normal[i, k, 2]) / math.sqrt(square)
-            ray[i, k, 0], ray[i, k, 1], ray[i, k, 2], ray[i, k, 3] = dx, dy, dz, _SHORT
-            weight[i, k] = larger(cosine, 0.0) / square * range_window(square, inverse_range)
 
 
 def _emission(light: PunctualLight) -> EmissionProfile:

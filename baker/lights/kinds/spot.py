@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from baker.core.light_kind import LIGHT_KINDS, EmissionProfile, LightJson, LightKind
 from baker.core.scene import PunctualLight
-from baker.lights.kinds.point import fill_inverse_square, finite_range, read_range
-from baker.trace.jit import kernel, larger, smaller
+from baker.lights.kinds.point import finite_range, read_range
 
 
 def _read(light: LightJson, world_from_light: NDArray[np.float64]) -> dict[str, Any]:
@@ -60,28 +59,12 @@ def _fill(
     ray: NDArray[np.float32],
     weight: NDArray[np.float32],
 ) -> None:
+    from baker.lights.shadow_rays import fill_inverse_square, multiply_by_cone
+
     position = np.array(light.position, np.float64)
     fill_inverse_square(position, light.inverse_range, origin, normal, ray, weight)
     direction = np.array(light.direction, np.float64)
-    _multiply_by_cone(direction, math.cos(light.outer_cone), _cone_scale(light), ray, weight)
-
-
-@kernel
-def _multiply_by_cone(direction, outer, scale, ray, weight):  # type: ignore[no-untyped-def]
-    """Multiply the weights by the angular fall-off of a spot light.
-
-    direction : (3,) float64, unit axis of the cone, world
-    outer, scale : float, cosine of the outer angle, and `_cone_scale`
-    ray : (n, 16, 4) float32, see `FillRays`; read
-    weight : (n, 16) float32, see `FillRays`; changed in place
-    """
-    for i in range(ray.shape[0]):
-        for k in range(ray.shape[1]):
-            dx, dy, dz = ray[i, k, 0], ray[i, k, 1], ray[i, k, 2]
-            length = math.sqrt(larger(dx * dx + dy * dy + dz * dz, 1.0e-20))
-            cosine = -(dx * direction[0] + dy * direction[1] + dz * direction[2]) / length
-            share = smaller(larger((cosine - outer) * scale, 0.0), 1.0)
-            weight[i, k] *= share * share
+    multiply_by_cone(direction, math.cos(light.outer_cone), _cone_scale(light), ray, weight)
 
 
 def _emission(light: PunctualLight) -> EmissionProfile:
