@@ -1,7 +1,6 @@
 """Defines the atlas: the page and the lightmap uv of each instance.
 
-A chart is a piece of surface that is connected in uv. A page is one image. Padding consists of the empty
-texels between charts.
+A chart is a piece of surface that is connected in uv. A page is one image of the atlas.
 """
 
 from __future__ import annotations
@@ -18,28 +17,29 @@ from baker.core.scene import SceneWarning
 
 @dataclass(frozen=True, eq=False)
 class InstanceLayout:
-    """The lightmap uv of one instance. An instance lies in exactly one page.
+    """The lightmap uv of one instance. All triangles of an instance are on the same page.
 
     Unwrapping splits vertices at chart borders. The V' vertices after the split are called lightmap vertices.
+    The mesh of the instance has T triangles.
 
     Attributes
     ----------
     instance : int
         Index into `Scene.instances`.
     page : int
-        Index of its page.
+        Index of the page, from 0.
     vertex : (V',) int32
         For each lightmap vertex, the index of the mesh vertex that it is a copy of.
     uv : (V', 2) float32
         Lightmap uv in the page, 0 to 1, with scale and offset applied; v = 0 is the first image row.
     triangle : (T, 3) int32
-        Indices into the lightmap vertices. Row t is triangle t of the mesh, with the same order of corners.
+        Indices into the lightmap vertices. Row t is row t of `Mesh.triangle`, with the same order of corners.
     chart : (T,) int32
         Index of each triangle's chart. Charts are numbered from 0 over the whole atlas.
     kept : bool
         Whether the uv is TEXCOORD_1 of the scene file, up to scale and offset.
     texels_per_metre : float
-        Texels per metre of surface.
+        Mean number of texels along one metre of surface.
     """
 
     instance: int
@@ -64,7 +64,7 @@ class Atlas(Result):
     layouts : tuple of InstanceLayout, in the order of `Scene.instances`
     n_charts : int
     padding : int
-        Empty texels between charts.
+        Number of empty texels between charts that were unwrapped.
     warnings : tuple of SceneWarning
     """
 
@@ -86,7 +86,7 @@ class Atlas(Result):
         }
 
     def to_dict(self) -> dict[str, Any]:
-        """Return sizes, warnings, and the page and density of each object, as JSON-serialisable values."""
+        """Return sizes, warnings and the layout of each instance without its arrays, as JSON values."""
         return {
             "resolution": self.resolution,
             "n_pages": self.n_pages,

@@ -1,6 +1,7 @@
-"""Limits the work of a bake, and estimates its texels, rays and memory before it runs.
+"""Estimates the texels, rays and memory of a bake before it runs, and defines limits of its work.
 
-The stages of a bake, the rules of `baker check` and the memory limit of `baker batch` use these estimates.
+The rule `cost` of `baker check` and the memory limit of `baker batch` use the estimates. The stages of a bake
+use the limits.
 """
 
 from __future__ import annotations
@@ -17,28 +18,27 @@ from baker.core.stage import Stage
 if TYPE_CHECKING:
     from baker.core.settings import BakeSettings
 
-# Patches are the blocks of texels that radiosity treats as one surface element. This is the largest number of
-# patches outside narrow gaps, and also the largest number inside them. Blocks are enlarged until the numbers
-# are within this limit.
+# Intended largest number of patches, which are the blocks of texels that radiosity treats as one surface
+# element. Blocks are enlarged up to 256 texels a side to stay within it. Patches in narrow gaps have the same
+# limit and are counted separately.
 MAX_PATCHES = 32768
-# Smallest and largest number of rays from each patch for its form factors. Between these limits, the number
-# equals the hemisphere rays per texel.
+# Smallest and largest number of rays from each patch for its form factors. The number is that of the
+# hemisphere rays per texel, clamped to these limits.
 MIN_PATCH_RAYS, MAX_PATCH_RAYS = 128, 512
 
-# Share of the texels of a page that charts cover: without the setting `density`, and with it. In this
+# Assumed share of the texels of a page that charts cover, without and with the setting `density`. In this
 # project's scenes at 512 and 1024 texels a side, the share was 0.67 to 0.83 without `density` and 0.55 to
-# 0.69 with it. With `density` it is lower, because instances have a fixed scale and each must fit on a page.
+# 0.69 with it. With `density` it is lower, because charts cannot be scaled until they fill the page.
 FILLED, FILLED_AT_DENSITY = 0.8, 0.65
-# Rays per texel that do not depend on settings: to find points inside geometry, to each light without area,
-# and to nearby emitters.
+# Rays per texel that do not depend on settings: rays that find points inside geometry, shadow rays to each
+# light without area, and hemisphere rays of texels near emitters.
 INSIDE_RAYS, DELTA_LIGHT_RAYS, NEAR_RAYS = 4, 16, 4
 
 MIB = 1 << 20
 # All byte numbers are resident memory, fitted to peaks measured with `benchmarks/memory_peaks.py`.
-# Memory of Python, libraries and compiled kernels together, and memory of each triangle.
+# Memory of Python, libraries and compiled kernels together, and memory of each triangle, bytes.
 BASE_BYTES, BYTES_PER_TRIANGLE = 205 * MIB, 350
-# Largest side of an image in memory, texels: readers reduce larger images by averaging blocks of 2 x 2
-# texels.
+# Side above which readers of images halve an image by averaging blocks of 2 x 2 pixels, pixels.
 LARGEST_IMAGE_SIDE = 8192
 # Bytes of memory for each byte of decoded image pixels: 1 for the image of the scene, 1 for the copy that
 # kernels read, and 1.5 for the coarser mip levels of this copy.
@@ -46,17 +46,17 @@ BYTES_PER_IMAGE_BYTE = 3.5
 # Number of texels up to which the 16 sample points of each texel are cached between ray stages, and the bytes
 # of these points (position and normal, float32). Bakes with more texels cache no points.
 MAX_CACHED_TEXELS, CACHED_BYTES_PER_TEXEL = 262_144, 384
-# Bytes of all other arrays per texel, in the ray stages and while pages are finished: first for bakes of
-# ambient occlusion only, then for bakes with light.
+# Bytes of all other arrays per texel, in the ray stages and while pages are finished. The first line is for
+# bakes without light, the second for bakes with light.
 AO_RAY_BYTES_PER_TEXEL, AO_FINISH_BYTES_PER_TEXEL = 150, 230
 LIGHT_RAY_BYTES_PER_TEXEL, LIGHT_FINISH_BYTES_PER_TEXEL = 200, 380
 # Bytes for each ray from each patch: form factor, reciprocal form factor, and the merged form factor.
 BYTES_PER_PATCH_RAY = 28
-# Memory of Open Image Denoise for each pixel of a page, and its largest memory, bytes. Pages that would need
-# more memory are split into tiles.
+# Memory of Open Image Denoise for each pixel of a page, and its largest memory, bytes. The latter is constant
+# because large pages are denoised in tiles.
 DENOISE_BYTES_PER_PIXEL, MAX_DENOISE_BYTES = 520, 650 * MIB
-# Estimated number of additional small patches where charts end, normals change or gaps are narrow: per
-# triangle, and the largest total.
+# Estimated number of additional small patches at chart borders, at changes of the normal and in narrow gaps:
+# number per triangle, and largest number of a bake.
 EXTRA_PATCHES_PER_TRIANGLE, MAX_EXTRA_PATCHES = 0.4, 13000
 
 
@@ -89,7 +89,7 @@ def texels_and_pages(settings: BakeSettings, area: float) -> tuple[int, int]:
     Returns
     -------
     texels : int
-        Number of texels on surfaces, of all pages.
+        Number of texels on surfaces, summed over all pages.
     pages : int
         Number of pages: 1 if no density is set, else at most `max_pages`.
     """
@@ -136,9 +136,9 @@ def image_bytes(scene: Scene) -> tuple[int, int]:
     decoded : int
         Size of the pixels of all decoded images, bytes.
     loading : int
-        Largest size while an image is read, bytes. It consists of all decoded images, and of one image a
-        second time at the resolution of its file. If a decoded image has more than half of
-        `LARGEST_IMAGE_SIDE` texels a side, the image in its file is assumed to have twice that side.
+        Largest size while an image is read, bytes: `decoded` plus the largest 8-bit image at the resolution
+        of its file. If the longer side of a decoded image is above `LARGEST_IMAGE_SIDE` / 2, the image in the
+        file is assumed to have twice as many rows and columns, because it may have been halved.
     """
     textures = [t for m in scene.materials for t in (m.base_colour_texture, m.emission_texture)]
     images = {id(t.image): t.image for t in textures if t is not None}.values()
@@ -175,7 +175,7 @@ class Workload:
     ambient_occlusion: bool
 
     def patches(self, settings: BakeSettings) -> int:
-        """Estimate the number of patches: blocks of 2^k x 2^k texels, and smaller ones at chart borders."""
+        """Estimate the number of patches; 0 if the bake has no light or no bounces."""
         if not self.light or settings.bounces == 0:
             return 0
         even = float(self.texels)
@@ -185,7 +185,10 @@ class Workload:
         return min(round(even + extra), self.texels)
 
     def rays(self, settings: BakeSettings, *, delta_lights: int, emitters: bool) -> dict[Stage, int]:
-        """Estimate the number of rays of each stage: upper bounds, because texels may need fewer rays.
+        """Estimate the number of rays of each stage.
+
+        All texels are counted as if they were near emitters. Rays that only some texels cast are left out:
+        the second pass of `INSIDE_GEOMETRY`, and rays from additional small patches.
 
         Parameters
         ----------
@@ -198,6 +201,7 @@ class Workload:
         Returns
         -------
         dict of Stage to int
+            Only stages that the bake runs.
         """
         hemisphere = settings.hemisphere_samples
         occlusion = settings.ao_samples or hemisphere
@@ -215,11 +219,9 @@ class Workload:
     def peak_bytes(self, settings: BakeSettings) -> int:
         """Estimate the largest resident memory of a bake.
 
-        Triangles and images stay in memory throughout. The peak is the largest of three:
-
-        - while the largest image is read;
-        - during the ray stages, which store all form factors;
-        - while pages are finished, when the denoiser allocates its memory.
+        Triangles and images stay in memory throughout. The estimate is the maximum of three numbers: the
+        memory while images are read, the memory during the ray stages, which store all form factors, and the
+        memory while pages are finished and denoised.
 
         Parameters
         ----------
@@ -228,7 +230,7 @@ class Workload:
         Returns
         -------
         int
-            Bytes, within 30 % of the peaks in `tests/unit/core/test_budget.py`.
+            Bytes, within 30 % of the peaks that `tests/unit/core/test_budget.py` measures.
         """
         decoded, loading = self.image_bytes
         scene = BASE_BYTES + BYTES_PER_TRIANGLE * self.triangles

@@ -13,7 +13,7 @@ def start_module(module: str) -> subprocess.Popen[bytes]:
     Parameters
     ----------
     module : str
-        Dotted name of the module. The child process gets the module search path of this process.
+        Dotted name of the module. The child process searches modules in the folders of `sys.path`.
 
     Returns
     -------

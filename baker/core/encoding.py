@@ -20,11 +20,11 @@ from baker.core.errors import InputError, ResourceError
 from baker.core.registry import Registry
 from baker.core.settings_model import Settings
 
-# Relative error of a stored value above which steps between stored values are visible. The eye distinguishes
-# luminances that differ by 1 to 2 %.
+# Largest error of a stored value, as a share of the texel's brightest component, that is not visible. The eye
+# distinguishes luminances that differ by 1 to 2 %.
 VISIBLE_STEP = 0.01
-# Value below which a texel is displayed as black, as a share of the page's mean. Steps between values below
-# it are not counted.
+# Absolute value up to which a texel counts as black, as a share of the mean absolute value of the page's
+# texels on surfaces. Errors of black texels are not counted.
 BLACK = 0.01
 # Encoding of the files that every bake writes.
 ALWAYS_WRITTEN = "exr"
@@ -59,7 +59,7 @@ class EncodingOptions(Settings):
     """Base class for the options of an encoding; each option is a field made with `setting`.
 
     Options are settings of a bake, so their names must differ from those of all other settings. The type of a
-    field is one that a flag can have: str, int, float, bool or Literal.
+    field is str, int, float, bool or Literal, because the command line makes a flag of it.
     """
 
 
@@ -74,7 +74,7 @@ class Encoding(ABC, Generic[Options]):
     suffix : str
         End of the file names of this format. It must differ from the suffixes of all other encodings.
     components : tuple of int
-        Numbers of components that an image in this format may have.
+        Numbers of components per pixel that the format supports.
     signed : bool
         Whether the format can store negative values.
     options_type : type of `EncodingOptions`
@@ -95,7 +95,7 @@ class Encoding(ABC, Generic[Options]):
         return self.options_type(**{name: getattr(settings, name) for name in self.options_type.model_fields})
 
     def fitted(self, options: Options, brightest: float) -> Options:
-        """Return `options` after setting those that depend on `brightest`, the largest value of the map."""
+        """Return the options for a map whose largest value is `brightest`; by default `options` unchanged."""
         return options
 
     def options_of_image(self, image: DecodedImage) -> Options:
@@ -104,11 +104,11 @@ class Encoding(ABC, Generic[Options]):
 
     @abstractmethod
     def limits(self, options: Options) -> tuple[float, float]:
-        """Return the smallest and largest value that can be stored. Values outside are clipped to them."""
+        """Return the smallest and the largest value that can be stored; other values are clipped to them."""
 
     @abstractmethod
     def stored(self, pixels: NDArray[np.float32], options: Options) -> NDArray[np.float32]:
-        """Return (..., C) float32: the values that result from encoding and decoding pixels (..., C)."""
+        """Return (..., C) float32: the values that `decode` returns after `encode` wrote pixels (..., C)."""
 
     @abstractmethod
     def tolerance(self, pixels: NDArray[np.float32], options: Options) -> NDArray[np.float64]:
@@ -124,7 +124,7 @@ class Encoding(ABC, Generic[Options]):
         header: Mapping[str, str],
         names: tuple[str, ...] | None = None,
     ) -> None:
-        """Write pixels (H, W, C) to `path`, row 0 on top; equal arguments give equal bytes.
+        """Write pixels (H, W, C) to `path`, with row 0 as the top row. Equal arguments give equal bytes.
 
         Parameters
         ----------
@@ -201,9 +201,9 @@ class Loss:
     Attributes
     ----------
     clipped : int
-        Number of texels with a component outside the limits.
+        Number of texels of the whole page with a component outside the limits.
     banded : int
-        Number of texels on surfaces whose stored value differs visibly, see `measure_loss`.
+        Number of texels on surfaces that are not clipped and have a visible error, see `measure_loss`.
     surface : int
         Number of texels on surfaces.
     """
@@ -216,7 +216,7 @@ class Loss:
 def measure_loss(
     encoding: Encoding[Options], pixels: NDArray[np.float32], surface: NDArray[np.bool_], options: Options
 ) -> Loss:
-    """Count the texels that a format clips, and those where the steps between stored values are visible.
+    """Count the texels that a format clips, and the texels whose stored value has a visible error.
 
     Parameters
     ----------
@@ -236,9 +236,10 @@ def measure_loss(
 
     Notes
     -----
-    A texel is banded if it is not clipped and the stored value of a component differs from the true value by
-    more than `VISIBLE_STEP` times the texel's brightest component. Texels below `BLACK` times the page's mean
-    are not counted.
+    A texel is banded if it is on a surface and not clipped, and the stored value of a component differs from
+    the true value by more than `VISIBLE_STEP` times the largest absolute component of the texel. A texel is
+    not banded if this component is at most `BLACK` times the mean absolute value of all components of texels
+    on surfaces.
     """
     low, high = encoding.limits(options)
     n_surface = int(surface.sum())
@@ -256,7 +257,7 @@ def measure_loss(
 
 
 def check_pixels(pixels: NDArray[np.float32], components: tuple[int, ...], name: str) -> None:
-    """Raise an error if pixels are not (H, W, C) with C in `components`, or if a pixel is NaN.
+    """Raise an error if pixels are not (H, W, C) with C in `components`, or if a component is NaN.
 
     Parameters
     ----------
@@ -270,7 +271,7 @@ def check_pixels(pixels: NDArray[np.float32], components: tuple[int, ...], name:
     Raises
     ------
     ValueError
-        If the shape differs or a pixel is NaN.
+        If the shape differs, H or W is 0, or a component is NaN.
     """
     if pixels.ndim != 3 or pixels.shape[2] not in components or 0 in pixels.shape:
         shapes = " nor ".join(f"(H, W, {count})" for count in components)
@@ -278,7 +279,7 @@ def check_pixels(pixels: NDArray[np.float32], components: tuple[int, ...], name:
         if len(components) > 3:
             word, shapes = "not ", f"(H, W, {min(components)} to {max(components)})"
         raise ValueError(f"pixels of shape {pixels.shape} are {word}{shapes}")
-    # Test the minimum and maximum first: both are NaN if any pixel is. This avoids a mask for most pages.
+    # The minimum is NaN if any component is. Testing it first avoids a mask for pages without NaN.
     if np.isnan(pixels.min()) or np.isnan(pixels.max()):
         count = int(np.isnan(pixels).any(axis=2).sum())
         raise ValueError(f"{count} texels are not a number; {name} is not written")
@@ -345,7 +346,7 @@ def encodings_in_words() -> str:
 
 
 def _numbers(count: Sequence[int]) -> str:
-    """Return numbers of components as text, such as "1, 2 or 4"."""
+    """Return numbers of components as text, such as "1, 2 or 4" or "1 to 4"."""
     if len(count) > 2 and list(count) == list(range(count[0], count[-1] + 1)):
         return f"{count[0]} to {count[-1]}"
     *first, last = map(str, count)
@@ -353,7 +354,9 @@ def _numbers(count: Sequence[int]) -> str:
 
 
 def encoding_options() -> dict[str, type[EncodingOptions]]:
-    """Return {name of an encoding: class of its options}, for all encodings that have options.
+    """Return {name of an encoding: class of its options}, for encodings that have options.
+
+    If several encodings share a class of options, only the first of them by name is returned.
 
     Raises
     ------

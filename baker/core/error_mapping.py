@@ -11,7 +11,7 @@ from baker.core.errors import BakerError, Cancelled, InputError, ResourceError
 _OUT_OF_MEMORY = (
     "out of memory; try a smaller `resolution`, a lower `density`, fewer `samples` or fewer `threads`"
 )
-# Messages by `errno`, for exhausted resources and denied access.
+# Messages for exhausted resources and denied access, by `errno`.
 _RESOURCE_ERRNO = {
     errno.ENOSPC: "the disk is full; free some space, or write elsewhere with `out`",
     errno.EDQUOT: "the disk quota is used up; free some space, or write elsewhere with `out`",
@@ -29,12 +29,13 @@ def explain(error: BaseException) -> BakerError | None:
     Parameters
     ----------
     error : BaseException
-        Any exception that a stage of a bake raised.
+        Any exception.
 
     Returns
     -------
     BakerError or None
-        None for all other exceptions: they are caused by bugs in `baker`.
+        None if the exception is neither a `BakerError`, a `KeyboardInterrupt`, a `MemoryError`, an `OSError`
+        nor the error for a loop of links. Such an exception is a bug in `baker`, see `bug`.
     """
     if isinstance(error, BakerError):
         return error
@@ -53,12 +54,12 @@ def explain(error: BaseException) -> BakerError | None:
 
 @contextlib.contextmanager
 def memory_errors(*, file: str | None = None) -> Iterator[None]:
-    """Turn a `MemoryError` of the body into a `ResourceError`.
+    """Replace a `MemoryError` of the body of the `with` statement by a `ResourceError`.
 
     Parameters
     ----------
     file : str, optional
-        File that the body reads, for the error.
+        File that the body reads or writes; it becomes the error's attribute `file`.
 
     Yields
     ------
@@ -86,7 +87,7 @@ def bug(error: BaseException) -> ResourceError:
     Returns
     -------
     ResourceError
-        An error with exit code 4, because exit code 1 means that a check failed.
+        A `ResourceError`, because its exit code is 4. Exit code 1 would mean that a check failed.
     """
     what = f"{type(error).__name__}: {error}".splitlines()[0]
     return ResourceError(f"internal error ({what}); run with -vv to see where, and please report it")

@@ -1,6 +1,7 @@
-"""Errors that `baker` raises: a base class and one class for each exit code.
+"""Errors that `baker` raises: a base class, and one class for each of the exit codes 2, 3, 4 and 130.
 
-A message is one sentence that says what was found, in which file and object, and what to do.
+An error names the file and the object concerned. Its message is one sentence that says what was found and
+what to do.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ class BakerError(Exception):
     Parameters
     ----------
     message : str
-        One sentence: what was found, what was expected, what to do.
+        One sentence that says what was found and what to do.
     file : str or None
         The file concerned.
     object : str or None
@@ -57,7 +58,10 @@ class IndexRangeError(InputError):
 
 
 class ResourceError(BakerError):
-    """Memory or disk space ran out, or a required library is missing (exit code 4)."""
+    """A resource is exhausted, inaccessible or missing, or `baker` itself has a bug (exit code 4).
+
+    Examples of resources are memory, disk space, the permission to write a file, and libraries.
+    """
 
     kind = "resource"
     exit_code = 4

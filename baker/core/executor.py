@@ -1,4 +1,7 @@
-"""Defines the interface of executors, which run the tiles of ray stages in this process or on a cluster."""
+"""Defines the interface of executors, which run the tiles of ray stages in this process or on a cluster.
+
+A tile is a range of texels or patches that is computed at a time.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +18,10 @@ from baker.core.stage import Stage
 
 
 class TileExecutor(Protocol):
-    """Provides a tile runner for each stage. All executors give the same bytes."""
+    """Provides a tile runner for each ray stage. A bake gives the same bytes with every executor."""
 
     def open(self, scene: Scene, atlas: Atlas, settings: BakeSettings) -> None:
-        """Receive the data that all stages of a bake share; called once before the first stage."""
+        """Receive the data that all ray stages of a bake share; called once before the first of them."""
 
     def runner(self, stage: Stage, arrays: Mapping[str, NDArray[Any]]) -> TileRunner:
         """Return the runner of a stage; `arrays` are the results of earlier stages that this stage reads."""
@@ -31,7 +34,7 @@ class LocalTileExecutor:
     """Runs tiles on the threads of this process."""
 
     def open(self, scene: Scene, atlas: Atlas, settings: BakeSettings) -> None:
-        """Do nothing, because the stages have the data in this process."""
+        """Do nothing, because the data are already in this process."""
 
     def runner(self, stage: Stage, arrays: Mapping[str, NDArray[Any]]) -> TileRunner:
         """Return `run_tiles`."""

@@ -1,4 +1,6 @@
-"""Defines the interface of exports: each file of `baker.exporters` converts a finished bake for one engine.
+"""Defines the interface of exports, which convert a finished bake for one engine.
+
+Files of `baker.exporters` register the exports.
 
 Callers look up an export by its name in `EXPORTS` and do not import it. A new engine is therefore supported
 by one new file.
@@ -16,7 +18,10 @@ from baker.core.registry import Registry
 class Export(Protocol):
     """Writes a folder of files for one engine.
 
-    `needs` lists the channels that the bake must contain.
+    Attributes
+    ----------
+    needs : tuple of str
+        Names of the channels that the bake must contain.
     """
 
     needs: tuple[str, ...]
@@ -44,7 +49,7 @@ def check_exports(names: tuple[str, ...], channels: tuple[str, ...]) -> None:
     Raises
     ------
     SettingsError
-        If an export or a channel is missing; the message names the first one.
+        For the first export that does not exist or lacks a channel.
     """
     for name in names:
         for channel in EXPORTS.require(name, "export", setting="export").needs:

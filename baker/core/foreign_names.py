@@ -1,14 +1,15 @@
-"""Answers names of settings of other bakers: the setting of the same purpose, or a section of LIMITS.md.
+"""Maps names of settings of other programs to the setting with the same purpose or to a section of LIMITS.md.
 
-Without these answers, an unknown name such as `hdri` gets the setting with the most similar spelling, which
-usually has another purpose. All names are written with dashes, as flags are.
+The error for an unknown setting recommends this setting or section. Without this table it would recommend
+the setting with the most similar spelling, which usually has another purpose. All names are written with
+dashes, like flags.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection
 
-# Setting of a bake -> names of flags of other programs with the same purpose.
+# Keys: settings of a bake. Values: names of settings of other programs with the same purpose.
 SAME = {
     "samples": ("rays", "ray-count", "sample-count", "num-samples", "spp", "aa", "indirect-samples"),
     "light-samples": ("shadow-samples", "shadow-rays", "direct-samples"),
@@ -56,7 +57,8 @@ SAME = {
     "max-pages": ("max-atlases", "atlas-count", "max-lightmaps"),
 }
 
-# Title of a section of docs/LIMITS.md -> names of flags of other programs for what it describes.
+# Keys: titles of sections of docs/LIMITS.md, each of which describes something that `baker` does not do.
+# Values: names of settings of other programs that do it.
 LIMITED = {
     "CPU only": ("gpu", "device", "cuda", "optix", "hip", "metal", "opencl", "vulkan", "backend", "cpu"),
     "A sky of one colour": (
@@ -154,19 +156,21 @@ _SECTION = {name: title for title, names in LIMITED.items() for name in names}
 
 
 def foreign_answer(name: str, known: Collection[str]) -> tuple[str, str] | None:
-    """Return what a user needs who knows a setting from another baker.
+    """Return the setting or the section of LIMITS.md to recommend for an unknown name.
 
     Parameters
     ----------
     name : str
-        The unknown name. Case is ignored, and underscores are read as dashes.
+        The unknown name. Case is ignored, and underscores are read as dashes. If the name is in no table, it
+        is searched again without the prefixes "no-" and "use-".
     known : collection of str
-        Names that can be recommended, with dashes.
+        Settings that may be recommended, with dashes.
 
     Returns
     -------
     tuple of (str, str) or None
-        ("use", a name in `known`) or ("see", a section of docs/LIMITS.md); None if the name is in no list.
+        ("use", a setting in `known`) or ("see", a section of docs/LIMITS.md); None if no table has the name,
+        or if its setting is not in `known`.
     """
     name = name.lower().replace("_", "-")
     name = name if name in _WANTED or name in _SECTION else name.removeprefix("no-").removeprefix("use-")

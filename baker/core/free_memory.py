@@ -1,4 +1,4 @@
-"""Reads the memory that this process may use: what the machine has free, and limits of control groups."""
+"""Reads how much memory this process may still use: free memory of the machine, limits of control groups."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 PROC, CGROUPS = Path("/proc"), Path("/sys/fs/cgroup")
-# Version 1 reports a limit near the largest 64-bit number if there is none.
+# Limit of a control group from which on it counts as no limit, bytes. Version 1 of control groups reports
+# about 2^63 if there is no limit.
 _NO_LIMIT = 1 << 60
 
 
 def free_memory() -> int:
-    """Return the free memory of the machine, or what is left of the control group's limit if that is less.
+    """Return the free memory of the machine, or the rest of a control group's limit if that is smaller.
 
     Returns
     -------
@@ -37,9 +38,9 @@ def used_memory() -> int:
 
 
 def _left_in_groups(proc: Path, cgroups: Path) -> Iterator[int]:
-    """Yield what is left of each memory limit of Linux control groups that this process is subject to, bytes.
+    """Yield limit minus use, bytes, of each Linux control group of this process that has a memory limit.
 
-    Files in the page cache that the kernel can drop count as free.
+    Inactive pages of the file cache do not count as used, because the kernel can drop them.
     """
     for line in _text(proc / "self" / "cgroup").splitlines():
         _, _, rest = line.partition(":")

@@ -1,7 +1,7 @@
 """Converts the whole scene to one list of world-space triangles with lightmap uv.
 
-The triangles of a mesh are repeated for each of its instances. Rays can hit each triangle in the list, and
-each has its own texels.
+The list contains the triangles of a mesh once for each instance of the mesh, because each instance has
+separate texels.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ class Geometry:
     Attributes
     ----------
     position : (V, 3) float32, metres, world, relative to `origin`
-    normal : (V, 3) float32, unit shading normals, world
+    normal : (V, 3) float32, shading normals, world; unit, or 0 if the mesh has a normal of 0
     uv : (V, 2) float32, lightmap uv in the page, 0 to 1
     vertex_source : (V,) int32, index of the mesh vertex that each vertex is a copy of
     triangle : (T, 3) int32, indices into the vertices, counter-clockwise seen from the front
-    face_normal : (T, 3) float32, unit, world
+    face_normal : (T, 3) float32, world; unit, or 0 for triangles without area
     area : (T,) float32, m2, area of each triangle
     page, instance, chart, material : (T,) int32, indices of each triangle's page, instance, chart, material
     double_sided : (T,) bool, whether the material is double-sided
@@ -51,7 +51,7 @@ class Geometry:
 
     @property
     def diagonal(self) -> float:
-        """Return the diagonal of the bounding box, metres."""
+        """Return the diagonal length of the bounding box of all vertices, metres; 0 without vertices."""
         if not len(self.position):
             return 0.0
         return float(np.linalg.norm(self.position.max(axis=0) - self.position.min(axis=0)))
@@ -77,7 +77,7 @@ def world_geometry(scene: Scene, atlas: Atlas, origin: NDArray[np.float64] | Non
     Raises
     ------
     InputError
-        If all vertices have the same position in float32.
+        If there are vertices and all have the same position in float32.
     """
     origin = scene.origin if origin is None else origin
     columns: dict[str, list[NDArray[Any]]] = {name: [] for name in _COLUMNS}

@@ -4,12 +4,11 @@ A `LightKind` contains everything that differs between kinds: the unit, the glTF
 irradiance at points for the bake, the emission for the path tracer, and the power. Other code reads the
 `LightKind` of a light and never compares names of kinds. A light of an unregistered kind is refused.
 
-The bake and the path tracer share a light's parameters (`PunctualLight`) but no code. `fill` computes
-irradiance in a kernel of the light's file. `emission` returns an `EmissionProfile`, which the path tracer
-evaluates and samples with its own kernels. A profile is data, so a new kind needs no compilation of the path
-tracer, and its angular fall-off may be any function, given as a table. If the path kernels called a function
-of each kind instead, their loops over eight paths would not vectorize. Each new kind would also compile all
-path kernels again, which takes about a minute.
+The bake calls `fill`, which computes irradiance in a kernel of the light's file. The path tracer evaluates
+and samples the `EmissionProfile` that `emission` returns with its own kernels. A profile is data, so the
+kernels of the path tracer are the same for all kinds. The angular fall-off may be any function, given as a
+table. If these kernels called a function of each kind instead, their loops over eight paths would not
+vectorize, and each new kind would compile them again, which takes about a minute.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from baker.core.names import unknown_name
 from baker.core.registry import Registry
 from baker.core.scene import PunctualLight, Scene
 
-# Characters of an unknown kind's name that an error quotes.
+# Largest number of characters of an unknown kind's name that an error quotes.
 _QUOTED = 20
 
 Vector = tuple[float, float, float]
@@ -53,13 +52,13 @@ class FillRays(Protocol):
             The 16 points of n texels, metres, and their unit normals, world.
         ray : (n, 16, 4) float32, output
             Columns 0 to 2: direction to the light, of any length. Column 3: length of the shadow ray, as a
-            multiple of the direction's length. The ray ends just before a light with a position: if the
-            direction is the vector to the light, column 3 is 0.99999. For parallel light it is 1e30. All
-            values are finite, even for a point at the light.
+            multiple of the direction's length. For a light with a position, the shadow ray must end just
+            before the light. For example, if the direction is the vector to the light, column 3 is 0.99999.
+            For parallel light, column 3 is 1e30. All values are finite, even for a point at the light.
         weight : (n, 16) float32, output
             Unoccluded irradiance, lx, for an intensity of 1; 0 if the light is below the horizon. A surface
-            that faces parallel light has 1 lx. A surface on the axis of another light, 1 m away and facing
-            the light, has 1 lx as well.
+            that faces parallel light has 1 lx. A surface that faces a point light without a range at a
+            distance of 1 m has 1 lx as well.
         """
 
 
@@ -73,7 +72,11 @@ class LightJson(Protocol):
         """Return whether the object has the member `key`."""
 
     def number(self, key: str, default: float | None = None, *, low: float = ..., high: float = ...) -> float:
-        """Return the member `key`, a finite number between `low` and `high`; raise InputError otherwise."""
+        """Return the member `key`, or `default` if it is missing.
+
+        Raises InputError if the member is missing and there is no default, or if it is not a finite number
+        from `low` to `high`.
+        """
 
     def child_or_empty(self, key: str) -> LightJson:
         """Return the object that is the member `key`, or an empty object if there is none."""
@@ -85,18 +88,18 @@ class LightJson(Protocol):
 class EmissionProfile(NamedTuple):
     """The emission of a light without area, as data that the path tracer evaluates and samples.
 
-    If the light has a position, its intensity in unit direction w, and the irradiance of a surface that faces
-    it at distance r, are
+    A light with a position has the intensity I(w) in the unit direction w from the light. A surface that
+    faces the light at distance r has the irradiance E, with
 
-        I(w) = intensity f(w)        E = I(w) / r^2 clamp(1 - (r / range)^4, 0, 1)
+        I(w) = intensity f(w)        E = clamp(1 - (r / range)^4, 0, 1) I(w) / r^2
 
-    with c = w . axis. The function f is 0 for c < min_cosine, and otherwise
+    The fall-off f depends on c = w . axis. It is 0 for c < min_cosine, and otherwise
 
-        f(w) = 1                                                if `cone_scale` and `table` are None
         f(w) = clamp((c - min_cosine) cone_scale, 0, 1)^2       if `cone_scale` is set
         f(w) = bilinear lookup of (c, azimuth around the axis)  if `table` is set
 
-    A light without a position is parallel, and E = intensity.
+    If both are None, the light shines in all directions: f(w) = 1, and `min_cosine` is ignored. A light
+    without a position is parallel, and a surface that faces it has E = intensity.
 
     Attributes
     ----------
@@ -105,19 +108,19 @@ class EmissionProfile(NamedTuple):
     axis : tuple of 3 float
         Unit direction in which the light shines, world.
     min_cosine : float
-        Smallest cosine of the angle to the axis at which the light emits. Paths that start at the light have
-        uniformly distributed directions within this cone.
+        Smallest cosine of the angle to the axis at which the light emits.
     cone_scale : float or None
         1 / (cosine of the inner angle - cosine of the outer angle), as for spot lights of glTF.
     table : (n, m) float32, or None
         Values of f at n >= 2 equidistant values of c from `min_cosine` to 1, and at m >= 1 azimuths
-        k 2 pi / m. With m = 1, f does not depend on the azimuth. n and m must be so large that interpolation
-        is within 3e-5 of f; for example, f = c^8 needs n = 1024.
+        2 pi k / m, k = 0 to m - 1. With m = 1, f does not depend on the azimuth. n and m must be so large
+        that the error of the interpolation is at most 3e-5. For example, f = c^8 with `min_cosine` = -1 needs
+        about n = 1000.
     tangent : tuple of 3 float
         Unit direction of azimuth 0, perpendicular to the axis. Azimuths increase from it towards
         axis x tangent.
     inverse_range : float
-        1 / range^2, 1/m2; 0 for a light without a range.
+        1 / range^2, in 1 / m^2; 0 without a range.
     """
 
     position: Vector | None
@@ -147,26 +150,28 @@ class LightKind:
     gltf_type : str or None
         `type` in KHR_lights_punctual; None if glTF files cannot contain such lights.
     plausible_max : float
-        Intensity above which the unit is probably wrong.
+        Largest intensity that is plausible, in `unit`. Above it, the file probably uses another unit.
     read : callable
         read(json, linear) takes the light's JSON, and the linear part, (3, 3) float64, of its node's world
-        transform. It returns fields of `PunctualLight` by name. The fields that all kinds have are left out:
-        name, node, intensity, position and direction. Raises InputError.
+        transform. It returns fields of `PunctualLight` by name, without those that the importer sets: name,
+        node, intensity, position and direction. It raises InputError for invalid members.
     write : callable
         write(light) returns the members of the light's JSON that `read` reads.
     describe : callable
         describe(light) returns position, direction and parameters by name, for the manifest.
     fill : FillRays
-        Computes the irradiance at points, for the bake.
+        Computes shadow rays and unoccluded irradiance at points, for the bake.
     emission : callable or None
-        emission(light) returns its `EmissionProfile`. If it is None, the path tracer refuses such lights.
+        emission(light) returns its `EmissionProfile`. If `emission` is None, the path tracer refuses lights
+        of this kind.
     power : callable
         power(light, disc) returns an upper bound of the flux, lm, of the light at intensity 1. For parallel
-        light, this is the flux through a disc as wide as the scene, of area `disc`, m2. Paths choose lights
-        with probabilities proportional to power.
+        light, this is the flux through a disc of area `disc`, m2, whose diameter is the diagonal of the
+        scene. The probability with which a path chooses a light depends on power, see
+        `baker.pathtracer.light_table`.
     delta : bool
-        Whether the light reaches each point from a single direction, so that no random ray hits it. The path
-        tracer refuses other lights.
+        Whether the light reaches each point from a single direction, so that no random ray hits it. If it is
+        False, the path tracer refuses lights of this kind.
     """
 
     name: str
@@ -188,7 +193,7 @@ LIGHT_KINDS: Registry[LightKind] = Registry("baker.lights.kinds")
 
 
 def kind_of(light: PunctualLight) -> LightKind:
-    """Return the record of a light's kind.
+    """Return the `LightKind` of a light.
 
     Parameters
     ----------
@@ -198,7 +203,7 @@ def kind_of(light: PunctualLight) -> LightKind:
     Returns
     -------
     LightKind
-        The record registered under that name.
+        The kind that is registered under that name.
 
     Raises
     ------
@@ -257,7 +262,7 @@ def check_light_kinds(scene: Scene) -> None:
     Raises
     ------
     InputError
-        With the scene's file and the light's name.
+        For the first such light; the error has the scene's file and the light's name.
     """
     try:
         for light in scene.lights:

@@ -6,8 +6,9 @@ from baker.core.errors import InputError
 from baker.core.light_kind import check_light_kinds, kind_of
 from baker.core.scene import Scene
 
-# Largest intensity (cd or lx) and emission (cd/m2) that a bake accepts. Up to this limit, the square of the
-# resulting irradiance fits into float32. For comparison, the disc of the sun has 2e9 cd/m2.
+# Largest intensity (cd or lx) and emission (cd/m2) of a component that a bake accepts. Up to this limit, the
+# square of the irradiance fits into float32, except within about 7 mm of a light with a position whose
+# intensity is at the limit. For comparison, the disc of the sun has 2e9 cd/m2.
 BRIGHTEST = 1e15
 
 
@@ -22,7 +23,7 @@ def check_brightness(scene: Scene) -> None:
     Raises
     ------
     InputError
-        If a light's kind is not registered, or an intensity or an emission is above `BRIGHTEST`.
+        If a light's kind is not registered, or a component of an intensity or emission is above `BRIGHTEST`.
     """
     check_light_kinds(scene)
     named = [(f"material '{m.name}'", "emission", m.emission, "cd/m2") for m in scene.materials]

@@ -1,4 +1,4 @@
-"""Defines finished maps, the status of their texels, and the result of a bake."""
+"""Defines the finished map of a channel, the status of texels, and the result of a bake."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ if TYPE_CHECKING:
 
 
 class TexelStatus(IntEnum):
-    """Status of a texel of a page. These values are stored in `status_0.png`."""
+    """Status of a texel of a page. The files `status_<page>.png` contain these values.
+
+    An invalid texel has no valid point and is filled from other texels.
+    """
 
     EMPTY = 0
     COVERED = 1
@@ -37,16 +40,16 @@ class ChannelDescription:
     unit : str
         Unit of the values: "lx", "1", ...
     quantity : str
-        Name of the quantity.
+        Name of the quantity, such as "irradiance".
     definition : str
-        Definition of the quantity as a formula.
+        Definition of the quantity, as a formula or a phrase.
     components : tuple of str
         Names of the components in the order of the last axis of a map; they are the names of EXR channels.
         ("R", "G", "B") and ("Y",) have no layer; "L1.R" is channel R of the layer L1.
     signed : bool
         Whether values may be negative.
     colour : bool
-        Whether R, G and B are linear Rec.709.
+        Whether the components are R, G and B of a linear Rec.709 colour.
     """
 
     unit: str
@@ -63,9 +66,10 @@ class ChannelDescription:
 
     @property
     def groups(self) -> tuple[slice, ...]:
-        """Return slices of the components: the R, G, B of one layer, or a single component.
+        """Return slices that divide the components into groups.
 
-        Signed components are always single.
+        A group is either R, G and B of one layer, or a single component. If `signed` is true, each component
+        is a group.
         """
         groups, start = [], 0
         while start < len(self.components):
@@ -87,7 +91,7 @@ class Lightmap(Result):
     channel : str
         "irradiance", "ao", ...
     value : (P, H, W, C) float32
-        Values by page, row (row 0 is v = 0), column and component.
+        Value of component c at page p, row i and column j: `value[p, i, j, c]`. Row 0 is at v = 0.
     description : ChannelDescription
         Unit, quantity and components.
     """
@@ -112,7 +116,7 @@ class Lightmap(Result):
         }
 
     def picture(self) -> NDArray[np.float32] | None:
-        """Return the first page, or None if the map has neither one nor three components."""
+        """Return page 0, (H, W, C), or None if C is neither 1 nor 3."""
         return self.value[0] if self.value.shape[-1] in (1, 3) else None
 
     def to_dict(self) -> dict[str, Any]:
@@ -130,18 +134,18 @@ class BakeResult(Result):
     lightmaps : dict of str to Lightmap
         Maps by channel.
     status : (P, H, W) uint8
-        `TexelStatus` of each texel of the pages.
+        `TexelStatus` of each texel of the P pages.
     texel_count : (I,) int64
         Number of texels of each instance, in the order of `scene.instances`.
     statistics : dict of channel to {min, max, mean, clipped, invalid}
     suggested_exposure : float or None
-        Factor on albedo x E / pi for a display: the median of the lit texels is then 0.18, 1 = white. It is 1
-        for a black bake, and None without the channel irradiance.
+        Factor on albedo x E / pi for a display. With this factor, the median luminance of the texels that are
+        not black is 0.18 of white. It is 1 for a black bake, and None without the channel irradiance.
     timings : dict of stage to seconds
     rays : dict of stage to number of rays
     solve : dict
-        Size and convergence of the radiosity solution: {patches, nonzeros, iterations, residual,
-        energy: {emitted, absorbed, escaped}, ...}
+        Size, convergence and energy of the radiosity solution: {patches, nonzeros, iterations, residual,
+        energy: {emitted, absorbed, escaped}, ...}; empty if nothing was solved.
     denoise : dict
         Name, version and filter of the denoiser; empty without denoising.
     out : Path or None
@@ -180,11 +184,11 @@ class BakeResult(Result):
         return rows if self.out is None else {**rows, "out": str(self.out)}
 
     def picture(self) -> NDArray[np.float32] | None:
-        """Return the first page of the first channel."""
+        """Return the first page of the first channel, (H, W, C); None without channels."""
         return next((lightmap.value[0] for lightmap in self.lightmaps.values()), None)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return statistics, timings, warnings and the manifest as JSON-serialisable values."""
+        """Return statistics, timings, rays, warnings and all keys of the manifest, as JSON values."""
         found = {
             "out": None if self.out is None else str(self.out),
             "statistics": self.statistics,

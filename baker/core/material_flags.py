@@ -1,4 +1,4 @@
-"""Reads a flag of the materials of faces."""
+"""Looks up a boolean property of the material of each face."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from baker.core.scene import Material
 def flag_of_faces(
     materials: Sequence[Material], material: NDArray[np.integer], flag: Callable[[Material], bool]
 ) -> NDArray[np.bool_]:
-    """Return a flag of the material of each face.
+    """Return a boolean property of the material of each face.
 
-    `flag` is called only for materials that occur. A table of all materials for each mesh would make the
-    time proportional to meshes times materials.
+    `flag` is called only for materials that occur in `material`. If it were called for all materials of the
+    scene for each mesh, the time would be proportional to the number of meshes times that of materials.
 
     Parameters
     ----------
@@ -25,12 +25,12 @@ def flag_of_faces(
     material : (T,) integer
         Index of the material of each face.
     flag : callable
-        Returns the flag of a material.
+        `flag(material)` returns the property of a material.
 
     Returns
     -------
     (T,) bool
-        The flag of each face.
+        The property of each face's material.
     """
     used, face = np.unique(material, return_inverse=True)
     return np.array([flag(materials[k]) for k in used], bool)[face]

@@ -1,4 +1,4 @@
-"""Builds the error for an unknown name of a setting, channel, export, metric or rule."""
+"""Builds the error for an unknown name, such as that of a setting, a channel, an export or a rule."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def unknown_name(
     listed: str | None = None,
     error: type[E] = SettingsError,  # type: ignore[assignment]
 ) -> E:
-    """Return the error for an unknown name, which suggests the nearest known name and lists all names.
+    """Return the error for an unknown name, with the most similar known name and a list of the known names.
 
     Parameters
     ----------
     what : str
-        Kind of the named objects, in the singular: "channel".
+        What the names denote, in the singular: "channel".
     name : str
-        The unknown name. The search for the nearest name ignores case and treats dashes as underscores.
+        The unknown name. The search for a similar name ignores case and treats dashes as underscores.
     known : iterable of str
         The known names, in the order in which the message lists them.
     file : str or None
@@ -57,12 +57,15 @@ def unknown_name(
 def unknown_setting(
     what: str, name: str, known: Iterable[str], *, file: str | None = None, object: str | None = None
 ) -> SettingsError:
-    """Return the error for an unknown setting, which says what to use instead of settings of other bakers.
+    """Return the error for an unknown setting.
+
+    If another program has the setting, the error names the setting of `baker` with the same purpose, or a
+    section of LIMITS.md, see `foreign_answer`. Otherwise it is the error of `unknown_name`.
 
     Parameters
     ----------
     what : str
-        Kind of setting, in the singular.
+        What the names denote, in the singular: "setting".
     name : str
         The unknown name.
     known : iterable of str
@@ -75,7 +78,7 @@ def unknown_setting(
     Returns
     -------
     SettingsError
-        The error of `unknown_name` if no other baker has the setting; the caller raises it.
+        The error; the caller raises it.
     """
     settings = {setting.replace("_", "-"): setting for setting in known}
     found = foreign_answer(name, settings)

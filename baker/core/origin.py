@@ -4,10 +4,14 @@ Transforms to world space are float64. Positions that are traced or rasterised a
 this origin. The origin is 0 for scenes that lie around 0.
 
 The spacing of float32 numbers is about 2^-23 of their absolute value. An object of size s at distance d from
-the origin loses log2(d / s) of the 23 bits of its coordinates; `_UNCOUNTED_BITS` lost bits are ignored. The
-origin minimises the weighted sum of lost bits over all objects. The weight of an object is the square root of
-its number of triangles. A terrain or a backdrop around all other objects loses no bits for any origin inside
-its extent. A single distant object usually has less weight than the other objects together.
+the origin loses max(log2(d / s) - `_UNCOUNTED_BITS`, 0) bits of its coordinates. A candidate for the origin
+is rated by the weighted sum of the lost bits of all objects. The weight of an object is the square root of
+its number of triangles. Candidates are the point 0 and the centres of up to `_CANDIDATES` objects. The
+candidate with the smallest sum is chosen and rounded. A centre is chosen only if it saves more than
+`_MIN_GAIN` bits per object, as a weighted mean, compared with 0.
+
+A terrain or a backdrop around all other objects loses no bits for an origin among them. A single distant
+object usually has less weight than the other objects together.
 """
 
 from __future__ import annotations
@@ -17,14 +21,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-# Number of lost bits of an object that are ignored.
+# Number of bits that an object may lose without being counted.
 _UNCOUNTED_BITS = 3.0
-# Smallest weighted mean of the bits per object that an origin other than 0 must save.
+# Number of bits per object, as a weighted mean. An origin other than 0 is used if it saves more bits.
 _MIN_GAIN = 2.0
-# Number of candidate origins. Each candidate is the centre of an object. Half of these objects are those with
-# most triangles; the others are evenly spaced in the list of objects.
+# Largest number of objects whose centres are candidates. Half of them are the objects with most triangles,
+# the others are evenly spaced in the list of objects. An object that is chosen twice is one candidate.
 _CANDIDATES = 64
-# Approximate number of vertices that are read from a mesh with more vertices.
+# A mesh with more vertices is sampled: between this number and twice this number of vertices are read.
 _VERTICES = 1 << 15
 
 
@@ -47,7 +51,7 @@ def scene_origin(
     Returns
     -------
     origin : (3,) float64, metres, world
-        The origin, 0 if no other point saves enough bits.
+        The origin, (0, 0, 0) if no other candidate saves enough bits.
     """
     shapes = [_median_and_spread(vertices) for vertices in position]
     centre, size, weight = np.zeros((len(placed), 3)), np.zeros(len(placed)), np.zeros(len(placed))
@@ -60,7 +64,7 @@ def scene_origin(
     usable = (size > 0) & np.isfinite(centre).all(axis=1)
     centre, size, weight = centre[usable], size[usable], weight[usable]
     zero = np.zeros(3)
-    # Return early for most scenes: no origin can save more bits than are lost with the origin 0.
+    # Return early for most scenes, because no origin can save more bits than are lost with the origin 0.
     lost = _lost_bits(zero, centre, size)
     if not weight.sum() > 0 or weight @ lost <= _MIN_GAIN * weight.sum():
         return zero
@@ -71,7 +75,8 @@ def scene_origin(
     best = candidates[int(total.argmin())]
     if weight @ lost - total.min() <= _MIN_GAIN * weight.sum():
         return zero
-    # Round to multiples of a power of two, so that integer coordinates stay exact.
+    # Round to multiples of a power of two near the object's size, so that the subtraction of the origin keeps
+    # the trailing zero bits of coordinates.
     grid = 2.0 ** np.floor(np.log2(size[best]))
     return np.asarray(np.round(centre[best] / grid) * grid, np.float64)
 
@@ -82,16 +87,17 @@ def _lost_bits(
     """Return (n,) float64: the bits beyond `_UNCOUNTED_BITS` that each object loses with the origin `point`.
 
     point : (3,) float64, metres; centre : (n, 3) float64, metres; size : (n,) float64, metres
+    The distance of an object is the largest absolute component of `centre - point`.
     """
     distance = np.abs(centre - point).max(axis=1)
     return np.asarray(np.maximum(np.log2(np.maximum(distance / size, 1e-9)) - _UNCOUNTED_BITS, 0.0))
 
 
 def _median_and_spread(position: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the median (3,) of a mesh's vertices and their median distance (3,) from it along each axis.
+    """Return the median (3,) of a mesh's vertices and their median absolute deviation (3,), both by axis.
 
-    A few distant triangles do not affect medians. If all three median distances are 0 because most vertices
-    coincide, half the size of the bounding box is returned instead.
+    A few distant triangles do not affect medians. If the deviation is 0 along all three axes because most
+    vertices coincide, half the size of the bounding box is returned instead. A mesh without vertices gives 0.
     """
     some = position[:: max(1, len(position) // _VERTICES)].astype(np.float64)
     if not len(some):

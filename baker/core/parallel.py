@@ -1,7 +1,8 @@
 """Runs tiles of work on a pool of threads, with progress reports and cancellation between tiles.
 
-Kernels release the GIL, so several Python threads run them at the same time. Each tile writes a separate part
-of the output, so results depend neither on the number of threads nor on the order of tiles.
+A tile is a range of items, such as texels. Kernels release the GIL, so several Python threads run them at the
+same time. Each tile writes a separate part of the output, so results depend neither on the number of threads
+nor on the order of tiles.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from typing import Any, Protocol
 from baker.core.progress import Progress, report
 from baker.core.stage import Stage
 
-# Longest time between two progress reports, seconds. The caller may cancel at each report.
+# Time after which progress is reported even if no tile has finished, seconds. The caller may cancel at each
+# report.
 _REPORT_SECONDS = 0.1
 
 
@@ -26,7 +28,7 @@ def thread_count(threads: int | None) -> int:
     Parameters
     ----------
     threads : int or None
-        Requested number; None or 0 for all cores.
+        Requested number; None or 0 for one thread per core.
 
     Returns
     -------
@@ -40,7 +42,7 @@ def thread_count(threads: int | None) -> int:
     return os.cpu_count() or 1
 
 
-# The result of a tile: arrays with one row for each item, and numbers that are summed over tiles.
+# The result of a tile, a tuple of arrays with one row for each item and of numbers, such as numbers of rays.
 Part = tuple[Any, ...]
 
 
@@ -82,7 +84,8 @@ def run_tiles(
     work : callable
         `work(begin, end)` returns the result of the tile of items `begin` to `end - 1`.
     keep : callable or None
-        `keep(begin, end, part)` stores the result of a tile; None if `work` stores it itself.
+        `keep(begin, end, part)` stores the result `part` of a tile, in the thread that computed it. None if
+        `work` stores its result.
     threads : int
         Number of threads.
     stage : Stage
@@ -90,7 +93,7 @@ def run_tiles(
     progress : Progress
         Receives reports, and may cancel.
     rays_per_item : float
-        If positive, progress shows the rate in Mrays/s.
+        Number of rays per item. If it is positive, progress reports contain the mean rate in Mrays/s.
 
     Raises
     ------
@@ -126,7 +129,7 @@ def run_tiles(
 def _work_and_keep(
     work: Callable[[int, int], Any], keep: Callable[[int, int, Any], object] | None
 ) -> Callable[[int, int], object]:
-    """Return a function (begin, end) that computes the result of a tile and stores it with `keep`, if set."""
+    """Return a function (begin, end) that calls `work` and, if `keep` is not None, `keep` with the result."""
     if keep is None:
         return work
 

@@ -9,21 +9,22 @@ import threading
 import time
 
 _PR_SET_PDEATHSIG = 1
-# Time between two tests whether the parent runs, seconds, on systems that send no signal when it ends.
+# Time between two tests whether the parent runs, seconds, on systems other than Linux.
 _INTERVAL = 0.5
 
 
 def end_with_parent(parent: int) -> None:
     """Kill this process as soon as its parent has ended.
 
-    On Linux the kernel kills this process immediately. On other systems a thread tests twice a second whether
-    the parent runs. This thread cannot run while native code holds the global interpreter lock.
+    On Linux the kernel kills this process immediately. On other systems with `os.getppid`, a thread tests
+    twice a second whether the parent runs. This thread cannot run while native code holds the global
+    interpreter lock.
 
     Parameters
     ----------
     parent : int
-        Id of the parent process, from the parent itself or read as early as possible. If the parent has
-        changed since, this process exits immediately.
+        Id of the parent process, passed by the parent or read as early as possible. If the parent has ended
+        since, this process exits immediately with status 1.
     """
     if sys.platform == "linux":
         import ctypes

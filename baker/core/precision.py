@@ -1,8 +1,8 @@
 """Finds objects whose positions in float32 are too inaccurate for the size of their texels.
 
-Two kinds of coordinates are float32. Files store vertices in object space. 100 km from the object's origin,
-float32 numbers are spaced by 8 mm, and no transform of the node makes this spacing finer. A bake traces
-positions relative to the scene's origin. 100 km from that origin, they are spaced by 8 mm as well.
+Two kinds of coordinates are float32: vertices of files, in object space, and positions that a bake traces,
+relative to the scene's origin. At a coordinate of 100 km, float32 numbers are spaced by 8 mm. The transform
+of a node cannot make the spacing of its mesh's vertices finer.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 from baker.core.atlas import Atlas
 from baker.core.scene import Scene, SceneWarning
 
-# Spacing of float32 positions above which an object is reported, as a share of a texel's side.
+# Spacing of float32 positions, as a share of a texel's side, above which an object is reported.
 COARSE = 0.1
-# Share of a mesh's vertices that are ignored as outliers when the size of its coordinates is measured.
+# Share of a mesh's vertices, for each axis those with the largest absolute coordinates, that are ignored.
 _OUTLIERS = 0.1
-# Approximate number of vertices that are read from a mesh with more vertices.
+# A mesh with more vertices is sampled: between this number and twice this number of vertices are read.
 _VERTICES = 1 << 15
 
 
 @dataclass(frozen=True)
 class CoarseObjects:
-    """Objects with too coarse positions.
+    """Objects whose positions are too coarse.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class CoarseObjects:
     count : int
         Number of instances above `COARSE`.
     text : str
-        Description of the worst instance's defect, with numbers.
+        Description of the defect of the instance `worst`, with numbers.
     fix : str
         Advice to the user.
     """
@@ -89,7 +89,7 @@ def coarse_objects(scene: Scene, texel: NDArray[np.float64]) -> CoarseObjects | 
 
 
 def coarse_warnings(scene: Scene, atlas: Atlas) -> list[SceneWarning]:
-    """Return a warning about the object with the coarsest positions, if any object is too coarse.
+    """Return a warning about the object whose positions are coarsest relative to its texels, if too coarse.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def coarse_warnings(scene: Scene, atlas: Atlas) -> list[SceneWarning]:
 
 
 def _median_and_extent(position: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the median (3,) of vertices and the 90 % quantile of their absolute coordinates (3,)."""
+    """Return, by axis, the median (3,) of vertices and the 0.9 quantile (3,) of absolute coordinates."""
     some = position[:: max(1, len(position) // _VERTICES)].astype(np.float64)
     if not len(some):
         return np.zeros(3), np.zeros(3)
@@ -122,7 +122,7 @@ def _median_and_extent(position: NDArray[np.float32]) -> tuple[NDArray[np.float6
 
 
 def _float32_spacing(value: NDArray[np.float64] | float) -> NDArray[np.float64]:
-    """Return the distance from each value, as a float32 number >= 0, to the next larger float32 number."""
+    """Return the distance from each value >= 0, rounded to float32, to the next larger float32 number."""
     return np.asarray(np.spacing(np.asarray(value, np.float32)), np.float64)
 
 

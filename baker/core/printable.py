@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 
-# Largest length of a value from a file in a message, characters.
+# Length above which a value from a file is shortened in a message, characters.
 LONGEST_VALUE = 80
 # Format characters that are not escaped, because words contain them: zero-width joiner and non-joiner
 # (Arabic, Indic and emoji sequences) and the soft hyphen.
@@ -18,7 +18,7 @@ _QUOTED = re.compile(rf"(?<!\w)'([^'/\\]{{{LONGEST_VALUE + 1},}})'(?!\w)")
 
 
 def printable(text: str) -> str:
-    r"""Return a text in one line, with control characters as escapes such as `\x1b`.
+    r"""Return a text in one line, with invisible characters as escapes such as `\x1b`.
 
     Parameters
     ----------
@@ -28,7 +28,8 @@ def printable(text: str) -> str:
     Returns
     -------
     str
-        The text after line breaks and tabs are replaced by spaces and control characters by escapes.
+        The text, in which line breaks and tabs are replaced by spaces. Other characters of the categories
+        `_ESCAPED` (except `_JOINERS`) and code points that are not characters are replaced by escapes.
     """
     if text.isascii() and text.isprintable():
         return text
@@ -36,7 +37,7 @@ def printable(text: str) -> str:
 
 
 def shortened(text: str, most: int = LONGEST_VALUE) -> str:
-    """Return a value for a message, in the form of `printable` and with at most `most` characters.
+    """Return the result of `printable` for a value, with at most `most` characters.
 
     Parameters
     ----------
@@ -55,12 +56,13 @@ def shortened(text: str, most: int = LONGEST_VALUE) -> str:
 
 
 def message_line(text: str) -> str:
-    """Return a message in the form of `printable`, with long quoted values in the form of `shortened`.
+    """Return the result of `printable` for a message, with long quoted values replaced by `shortened` values.
 
     Parameters
     ----------
     text : str
-        The message. Values from a file are between single quotes. Paths are not shortened.
+        The message. Values from a file are between single quotes. Values with a slash or a backslash are not
+        shortened, because they may be paths.
 
     Returns
     -------
@@ -71,7 +73,7 @@ def message_line(text: str) -> str:
 
 
 def printable_lines(text: str) -> str:
-    """Return a text of several lines, each line in the form of `printable`.
+    """Return a text of several lines, after applying `printable` to each line.
 
     Parameters
     ----------

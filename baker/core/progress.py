@@ -12,7 +12,7 @@ class Progress(Protocol):
     """Receives the progress of a stage; a truthy return value cancels the work."""
 
     def __call__(self, stage: str, fraction: float, detail: str = "", /) -> object:
-        """Receive the share of `stage` that is done, 0 to 1; `detail` is a rate or a count to show."""
+        """Receive the share of `stage` that is done, 0 to 1, and `detail`, a rate or a count as text."""
 
 
 def silent(stage: str, fraction: float, detail: str = "", /) -> object:
@@ -36,12 +36,12 @@ def silent(stage: str, fraction: float, detail: str = "", /) -> object:
 
 
 def notify(progress: Progress, message: str) -> None:
-    """Pass on a message that the user should read before the work goes on.
+    """Pass a message for the user to the method `note` of a callback, if the callback has this method.
 
     Parameters
     ----------
     progress : Progress
-        A callback with a method `note`, which receives the message. Other callbacks get nothing.
+        The callback. If it has no method `note`, the message is dropped.
     message : str
         One sentence.
     """
@@ -62,7 +62,7 @@ def report(progress: Progress, stage: Stage, fraction: float, detail: str = "") 
     fraction : float
         Share of the stage that is done, 0 to 1.
     detail : str
-        A rate or a count to show.
+        A rate or a count, as text.
 
     Raises
     ------

@@ -1,10 +1,10 @@
-"""Formats numbers for readers: percentages and values with three significant digits, without exponents."""
+"""Formats numbers and percentages for users, with three significant digits and mostly without exponents."""
 
 from __future__ import annotations
 
 import math
 
-# Number of significant digits, and the largest number of decimals.
+# Number of significant digits, and number of decimals above which a number is written with an exponent.
 _DIGITS, _DECIMALS = 3, 6
 # Values at or above this magnitude are written with an exponent.
 _LARGEST = 1e15
@@ -24,7 +24,8 @@ def number(value: float, *, signed: bool = False) -> str:
     -------
     str
         "0.0152", "12.3", "1230" or "65500". Trailing zeros of the decimals are left out, and digits of an
-        integer part are zeros after the third.
+        integer part are zeros after the third. Magnitudes from 1e15 on have an exponent with three digits,
+        "1.23e+15", and magnitudes below 1e-4 one with two digits, "1.2e-05".
     """
     if not math.isfinite(value):
         return f"{value:+}" if signed else f"{value}"
@@ -55,14 +56,14 @@ def percent(share: float, *, signed: bool = False) -> str:
     Returns
     -------
     str
-        "1.52%" for 0.0152. Shares below a ten-thousandth of a percent are "0%".
+        "1.52%" for 0.0152. Percentages whose magnitude is below 0.0001 are "0%".
     """
     value = 100.0 * share
     return f"{number(0.0 if abs(value) < 1e-4 else value, signed=signed)}%"
 
 
 def amount(value: float) -> str:
-    """Return a number with three significant digits, with "million" or "billion" for large ones.
+    """Return a number with three significant digits; large numbers have "million", "billion" or "trillion".
 
     Parameters
     ----------

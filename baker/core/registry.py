@@ -1,4 +1,4 @@
-"""Plugins by name: each file of a package registers a plugin, and callers look it up by its name.
+"""Finds plugins by name: files of a package register plugins, and callers look them up by their names.
 
 Based on: Mitsuba 3, where each plugin is one file.
 """
@@ -93,12 +93,13 @@ def names_in_source(package: str, registry: str) -> list[str]:
     package : str
         Dotted name of the package.
     registry : str
-        Name of the registry in these files, such as "EXPORTS": calls of its method `register` are found.
+        Name of the registry in these files, such as "EXPORTS". Calls of its method `register` with a literal
+        argument are searched.
 
     Returns
     -------
     list of str
-        Names, sorted. They are those of `Registry.names` if all calls have a literal argument.
+        The literal arguments, sorted.
     """
     found = set()
     for folder in importlib.import_module(package).__path__:

@@ -1,4 +1,4 @@
-"""Defines the base class of results: one line for consoles, a table with a small picture for notebooks."""
+"""Defines the base class of results, which show one line in consoles and a table in notebooks."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ THUMBNAIL = 256
 class Result:
     """Base class of the return values of the Python API.
 
-    A subclass overrides `summary` and, if it has a picture, `picture`. `repr` shows the summary in one line;
-    a notebook shows it as a table, with the picture scaled down.
+    A subclass overrides `summary`, `to_dict` and, if it has a picture, `picture`. `repr` shows the summary in
+    one line. A notebook shows the summary as a table, with the picture scaled down below it.
     """
 
     def summary(self) -> dict[str, Any]:
@@ -29,7 +29,7 @@ class Result:
         return {}
 
     def picture(self) -> NDArray[np.float32] | None:
-        """Return a picture (H, W), (H, W, 1) or (H, W, 3), linear, or None if there is no picture."""
+        """Return a picture (H, W), (H, W, 1) or (H, W, 3) with linear values; None if there is no picture."""
         return None
 
     def to_dict(self) -> dict[str, Any]:
@@ -52,7 +52,7 @@ class Result:
 
 
 class Metrics:
-    """Mixin for a dataclass with a dict `metrics`, which makes each metric an attribute as well."""
+    """Mixin for dataclasses with a dict `metrics`. It lets each metric also be read as an attribute."""
 
     metrics: dict[str, Any]
 
@@ -78,13 +78,14 @@ def picture_uri(linear: NDArray[np.float32]) -> str:
     ----------
     linear : (H, W), (H, W, 1) or (H, W, 3) float32
         A picture of one component is clipped to 0 to 1 and not sRGB-encoded. Each component x of a colour
-        picture becomes x / (x + m), sRGB-encoded. m is the median, over the pixels whose mean of R, G and B
-        is above 0, of this mean; 1 if there are no such pixels.
+        picture becomes x / (x + m), sRGB-encoded, with m the median brightness of the pixels that are not
+        black. The brightness of a pixel is the mean of R, G and B. If all pixels are black, m = 1.
 
     Returns
     -------
     str
-        "data:image/png;base64,..."; at most `THUMBNAIL` pixels a side.
+        "data:image/png;base64,..."; an image of at most `THUMBNAIL` pixels a side. Larger pictures are
+        reduced by leaving out rows and columns.
     """
     value = np.asarray(linear, np.float32)
     value = value[..., None] if value.ndim == 2 else value
@@ -103,7 +104,7 @@ def picture_uri(linear: NDArray[np.float32]) -> str:
 
 
 def _png(pixels: NDArray[np.uint8]) -> bytes:
-    """Return the PNG file of pixels (H, W, 3) uint8. `core` must not import `baker.io.png`."""
+    """Return the PNG file of pixels (H, W, 3) uint8. This package must not import `baker.io.png`."""
     height, width = pixels.shape[:2]
     rows = np.zeros((height, 1 + 3 * width), np.uint8)
     rows[:, 1:] = pixels.reshape(height, -1)

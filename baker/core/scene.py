@@ -21,12 +21,13 @@ from baker.core.printable import message_line, printable
 from baker.core.result import Result
 from baker.core.source_mesh import SourceScene
 
-# Smallest range of a light, metres. Smaller ranges are raised to it, so that 1 / range^2 fits into float32.
+# Smallest range of a light, metres. A smaller range is treated as this range, so that 1 / range^2 fits into
+# float32.
 _SHORTEST_RANGE = 1e-12
 
 
-# Largest absolute image uv, number of repeats of the image. Beyond it, the spacing of float32 numbers exceeds
-# 1/64 of the image, and areas of triangles in uv may overflow.
+# Absolute value to which bakes clamp the uv of images, number of repeats of the image. Beyond it, the spacing
+# of float32 numbers is at least 1/32 of the image. Importers warn of TEXCOORD sets with larger values.
 LARGEST_UV = 2.0**18
 
 
@@ -37,7 +38,8 @@ class Texture:
     Attributes
     ----------
     image : (H, W, 4) uint8 or float32
-        uint8: values of the image file, RGB sRGB-encoded, alpha linear. float32: linear. Row 0 is v = 0.
+        RGBA. uint8: values of the image file, RGB sRGB-encoded, alpha linear. float32: linear. Row 0 is at
+        v = 0.
     texcoord : int
         Number of the mesh's TEXCOORD set that the texture uses.
     transform : (2, 3) float64
@@ -62,9 +64,9 @@ class Material:
     Attributes
     ----------
     base_colour : (4,) tuple
-        Linear Rec.709 RGB and alpha. Texture and vertex colour are further factors.
+        Linear Rec.709 RGB and alpha. They are multiplied by `base_colour_texture` and by the vertex colour.
     emission : (3,) tuple
-        Radiance in cd/m2. The texture is a further factor.
+        Radiance in cd/m2, linear Rec.709. It is multiplied by `emission_texture`.
     double_sided : bool
         Whether the surface reflects and emits on both sides. Otherwise its back is black.
     metallic_roughness_texture : Texture or None
@@ -88,13 +90,13 @@ class Material:
 
 @dataclass(frozen=True)
 class Mesh:
-    """Triangles in object space: the concatenated primitives of a mesh.
+    """The triangles of all primitives of a mesh, in object space, with V vertices and T triangles.
 
     Attributes
     ----------
     position : (V, 3) float32, metres, object space
     normal : (V, 3) float32, unit, object space; computed by the importer if the file has no normals
-    triangle : (T, 3) int32, indices into the vertices; only valid triangles
+    triangle : (T, 3) int32, indices into the vertices, without the triangles that the importer left out
     material : (T,) int32, index into `Scene.materials`
     primitive : (T,) int32, index of each triangle's primitive in the source mesh
     vertex_primitive : (V,) int32, index of each vertex's primitive in the source mesh
@@ -151,11 +153,11 @@ class PunctualLight:
         Colour times intensity, in the unit of the kind.
     position : (3,) tuple, metres, world
     direction : (3,) tuple, unit, world
-        Direction in which light travels along the axis, away from the light.
+        Direction in which light travels along the light's axis.
     inner_cone, outer_cone : float, radians
-        Angles between the axis and the inner and outer cone of a spot light.
+        Half of the opening angles of the inner and outer cone of a spot light.
     range : float, metres
-        Distance from which on a light with a position has no effect; inf for no limit.
+        Distance from which on a light with a position gives no irradiance; inf for no limit.
     parameters : mapping
         Further parameters by name, for kinds of light that have other parameters.
     """
@@ -173,7 +175,7 @@ class PunctualLight:
 
     @property
     def inverse_range(self) -> float:
-        """Return 1 / range^2, 1/m2; 0 for an infinite range."""
+        """Return 1 / range^2, in 1 / m^2; 0 for an infinite range."""
         return float(1.0 / max(self.range, _SHORTEST_RANGE) ** 2)
 
 
@@ -209,7 +211,7 @@ class SceneWarning:
     message : str
         One sentence.
     object : str
-        Name of the object concerned.
+        Name of the object concerned, empty for the whole scene.
     """
 
     code: str
@@ -224,16 +226,16 @@ class SceneWarning:
 
 @dataclass(frozen=True)
 class SourceDocument:
-    """The glTF document of a scene. The writer copies from it everything that a bake does not change.
+    """The glTF document of a scene. The writer of `scene.glb` copies everything that a bake does not change.
 
     Attributes
     ----------
     json : dict
-        The parsed document; it must not be changed.
+        The parsed document. Readers must not change it.
     buffers : tuple of bytes
         Content of each buffer, read from the BIN chunk, a file or a data URI.
     folder : Path or None
-        Folder that relative image URIs refer to.
+        Folder that relative image URIs refer to; None if there is no folder.
     allow_outside : bool
         Whether image URIs may refer to files outside that folder.
     missing, missing_images : frozenset of int
@@ -260,9 +262,10 @@ class Scene(Result):
     source : SourceDocument or None
         None for formats other than glTF, for which the writer creates a new document.
     sha256 : str
-        Hash of the scene file and of all files that it refers to, in the order of the references.
+        SHA-256 of the scene file and of the files that it refers to, in hexadecimal digits.
     source_scene : SourceScene or None
-        All triangles of the file, invalid ones included, if the scene was loaded with `lenient=True`.
+        All triangles of the file, invalid ones included. None unless the scene was loaded with
+        `lenient=True`.
     """
 
     name: str
@@ -316,7 +319,7 @@ class Scene(Result):
 
     @cached_property
     def local_lights(self) -> tuple[PunctualLight, ...]:
-        """Return the lights with positions relative to `origin`."""
+        """Return `lights` with their positions relative to `origin`."""
         if not self.origin.any():
             return self.lights
         return tuple(replace(light, position=self.to_local(light.position)) for light in self.lights)

@@ -25,7 +25,7 @@ from baker.core.settings_model import (
     threads_setting,
 )
 
-# Titles of the groups of the settings in the help. `BAKE` contains the settings that are changed most often.
+# Titles of groups of settings in the help of the command line.
 BAKE, LIGHT, OCCLUSION = "Bake", "Light and noise", "Ambient occlusion"
 PAGES = "Lightmap uv and pages"
 # Hemisphere rays per texel of each preset. They are also the default of `light_samples` and `ao_samples`.
@@ -118,7 +118,7 @@ class CommonSettings(Settings):
     threads: int | None = threads_setting()
 
     def check(self) -> None:
-        """Raise `SettingsError` if `sky`, `ao_distance` or `channels` is invalid."""
+        """Raise `SettingsError` if `sky` or `ao_distance` is invalid, or `channels` is empty."""
         super().check()
         if max(self.sky_radiance) > BRIGHTEST:
             raise SettingsError(f"`sky` is above {BRIGHTEST:.0e} cd/m2 (was '{self.sky}')", object="sky")
@@ -140,7 +140,7 @@ class CommonSettings(Settings):
         return (red * self.sky_strength, green * self.sky_strength, blue * self.sky_strength)
 
     def ao_reach(self, diagonal: float) -> float:
-        """Return the AO distance in metres (may be inf) for a scene whose bounding box has this diagonal."""
+        """Return the AO distance, metres or inf, of a scene whose bounding box has this diagonal, metres."""
         return ao_metres(self.ao_distance, diagonal)
 
 
@@ -204,7 +204,7 @@ def parse_sky(text: str) -> tuple[float, float, float]:
     Raises
     ------
     SettingsError
-        If the text has another form, or a number is negative or infinite.
+        If the text has another form, or a number is negative, infinite or NaN.
     """
     try:
         values = [float(part) for part in text.split(",")]

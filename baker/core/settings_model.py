@@ -1,8 +1,8 @@
 """Defines the base of all settings: pydantic models whose fields become flags, configuration keys and docs.
 
-Every command declares its settings as one subclass of `Settings`. Each field is made with `setting`, which
-takes its description, unit, range and default. `docs/make_settings_page.py` prints the fields,
-`cli/command.py` turns them into flags, and `docs/make_keywords.py` into keywords of the Python API.
+Every command has a subclass of `Settings`. Each field is made with `setting`, which takes its description,
+unit, range and default. `docs/make_settings_page.py` makes the settings page of the fields, `cli/command.py`
+makes flags of them, and `docs/make_keywords.py` makes keywords of the Python API.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from baker.core.errors import SettingsError
 from baker.core.names import unknown_setting
 
-# Number of characters of an invalid value that an error quotes.
+# Largest number of characters of an invalid value that an error quotes.
 _LONGEST = 80
 # Titles of groups of settings in the help: settings that every command has, settings of the files that a bake
 # writes, and settings of reading scene files.
@@ -50,7 +50,7 @@ def setting(
     repeated : bool
         Whether the flag may be given several times, in which case its values are concatenated.
     **bounds : object
-        Limits of the value by pydantic's names: ge, gt, le, lt, allow_inf_nan.
+        Arguments of `pydantic.Field` that limit the value: ge, gt, le, lt, allow_inf_nan.
 
     Returns
     -------
@@ -80,12 +80,14 @@ def same_setting(model: type[Settings], name: str) -> Any:
 
 
 def _split(value: Any) -> Any:
-    """Split a text, or each text of a list, at commas into a list of names; return other values unchanged."""
+    """Split a text, or each text of a list, at commas; return the names without repeats.
+
+    Values of other types are returned unchanged.
+    """
     if isinstance(value, list | tuple) and all(isinstance(part, str) for part in value):
         value = ",".join(value)
     if not isinstance(value, str):
         return value
-    # A name that is given twice counts once.
     return list(dict.fromkeys(part.strip() for part in value.split(",") if part.strip()))
 
 
@@ -115,7 +117,7 @@ def _plain(value: Any) -> Any:
 
 # A list of names, given as a list or as one text with commas.
 Names = Annotated[tuple[str, ...], BeforeValidator(_split)]
-# A list of texts that may contain commas, given as a list or as one text.
+# A list of texts that may contain commas, given as a list or, if it has one element, as a text.
 Texts = Annotated[tuple[str, ...], BeforeValidator(_one_name)]
 # A text, given as a text or as a number.
 Text = Annotated[str, BeforeValidator(_as_text)]
@@ -129,7 +131,7 @@ class Settings(BaseModel):
     Attributes
     ----------
     table : str
-        Table of the configuration file with these settings; empty if there is none.
+        Name of the table of the configuration file that contains these settings; empty if there is none.
     what : str
         Kind of setting in messages about unknown names: "there is no {what} 'x'".
     """
@@ -165,7 +167,7 @@ class Settings(BaseModel):
         )
 
     def check(self) -> None:
-        """Raise `SettingsError` for invalid values or combinations that types and bounds allow."""
+        """Raise `SettingsError` for invalid values or combinations that types and bounds do not exclude."""
 
     @classmethod
     def make(cls, values: Mapping[str, Any], *, file: str | None = None) -> Self:
@@ -176,7 +178,7 @@ class Settings(BaseModel):
         values : mapping of str to object
             Values by name of the setting. Dashes in names are read as underscores.
         file : str or None
-            File that contains the values, for the error.
+            File that contains the values, which the error names.
 
         Returns
         -------
@@ -186,7 +188,7 @@ class Settings(BaseModel):
         Raises
         ------
         SettingsError
-            For an unknown name (the message suggests the nearest known name) or a value out of range.
+            For an unknown name, a name that is given twice, or an invalid value.
         """
         try:
             return cls(**values)
@@ -196,7 +198,7 @@ class Settings(BaseModel):
             raise SettingsError(error.message, file=file, object=error.object) from None
 
     def changed(self, **values: Any) -> Self:
-        """Return a validated copy with some values replaced.
+        """Return a copy with some values replaced, after validation.
 
         Parameters
         ----------
@@ -221,7 +223,7 @@ class Settings(BaseModel):
         Returns
         -------
         bool
-            False if the setting has its default because it was left out.
+            False if the setting was left out and therefore has its default.
         """
         return name in self.model_fields_set
 

@@ -22,16 +22,16 @@ class SourcePrimitive:
     triangle : (T, 3) int64
         Indices into the vertices; they may be out of range.
     normal : (V, 3) float32 or None, object space
-        None if the file has no normals, which means flat normals.
+        None if the file has no normals. Readers then use the normals of the faces.
     texcoord : dict of int to (V, 2) float32
         TEXCOORD sets by number.
     colour : (V, 4) float32 or None, linear Rec.709
     further : (V, B) uint8 or None
-        The B bytes of all other attributes of each vertex; None unless the file is loaded with
+        The B bytes of all other attributes of each vertex; None unless a glTF file is loaded with
         `lenient=True`.
     stitched : bool
-        True for triangle strips. A strip's triangles with a repeated index only join two parts of the strip,
-        so they are dropped without a warning.
+        True for triangle strips. A triangle of a strip with a repeated index only joins two parts of the
+        strip, so it is dropped without a warning.
     """
 
     index: int
@@ -76,7 +76,7 @@ class SourceInstance:
 
 @dataclass(frozen=True)
 class SourceScene:
-    """All meshes that nodes of the scene refer to, in the order of their first instance."""
+    """All meshes that nodes of the scene refer to, in the order of their first instance, and these nodes."""
 
     meshes: tuple[SourceMesh, ...]
     instances: tuple[SourceInstance, ...]

@@ -1,20 +1,21 @@
-"""Names the stages of a bake and of other work, for progress reports, timings and ray counts."""
+"""Names the stages of bakes and other commands, for progress reports, timings and ray counts."""
 
 from __future__ import annotations
 
 from enum import StrEnum
 
-# Detail of progress reports while kernels are compiled, which only the first run after an install does.
+# Text of progress reports while kernels are compiled, usually only in the first run after an install.
 COMPILING = "compiling kernels, first run only"
 
 
 class Stage(StrEnum):
-    """A step of work that reports its progress.
+    """A step of work that reports its progress under the name in its value.
 
-    The values are keys of `timings` and `rays` in the manifest.
+    In the manifest, `timings` has the stages of a bake as keys, except `NARROW_GAPS`, which is a part of
+    `FORM_FACTORS`, and `DENOISE`, which is a part of `FINISH`. `rays` has the stages that cast rays as keys.
     """
 
-    # Stages of a bake, in the order in which they run.
+    # Stages of a bake, in the order in which they begin. A bake leaves out stages that it does not need.
     LOAD = "load"
     UNWRAP = "unwrap"
     TEXELS = "texels"
@@ -30,7 +31,7 @@ class Stage(StrEnum):
     FINISH = "finish"
     DENOISE = "denoise"
     WRITE = "write"
-    # Work before a bake, and the progress of several bakes or of a cluster.
+    # Start of a command, compilation of kernels, a batch, and a bake that runs on a cluster.
     START = "start"
     COMPILE = "compile"
     BATCH = "batch"

@@ -1,9 +1,9 @@
 """Defines the texels that lie on surfaces, with the data of each texel that the ray stages read.
 
-A texel buffer has n entries. Entries 0 to n_front - 1 are the front sides, one for each texel of the pages.
-Then follow the back sides of texels on double-sided surfaces. If another surface passes through a texel,
-`baker.radiosity.sides` splits the texel and appends an entry for each further side. Only front entries are
-stored in maps. All entries take part in light transport.
+A texel buffer has n entries. Entries 0 to n_front - 1 are the front sides, one for each covered texel of the
+pages. The back sides of texels that double-sided triangles cover follow. If another surface passes through a
+texel, `baker.radiosity.sides` splits the texel and appends an entry for each further side. Only front entries
+are stored in maps. All entries take part in light transport.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class TexelBuffer:
-    """The n texel entries. Front entries are in Morton order within each page, so neighbours are close by.
+    """The n texel entries. Front entries are sorted by page, then in Morton order.
 
     Attributes
     ----------
@@ -30,27 +30,29 @@ class TexelBuffer:
     first : (n_front + 1,) int64
     entry : (m,) int32
     entry_area : (m,) float32
-        The square of front texel k touches the triangles entry[s] with the slice s = first[k] : first[k + 1].
-        entry_area[s] are the areas of these triangles inside the square, in texels.
+        Front texel k consists of the triangles entry[s] with the slice s = first[k] : first[k + 1]. These are
+        the triangles of the texel's chart that touch its square. entry_area[s] are their areas inside the
+        square, in texels.
     chart, instance : (n,) int32
         Indices of chart and instance.
     area : (n,) float32, m2
-        Area of the surface inside the texel, times its opacity.
+        Area of the triangles inside the texel, times their mean opacity.
     centroid : (n_front, 2) float32, texels
-        Centroid (column, row) of that surface in the page, relative to the texel's centre.
+        Centroid (column, row) of the covered part of the texel's square, relative to the texel's centre.
     position : (n, 3) float32, metres, world, relative to `Geometry.origin`
-        Position of that centroid.
+        Position of the centroid on the surface.
     normal : (n, 3) float32
         Unit shading normal, world; reversed on back entries.
     albedo : (n, 3) float32, linear Rec.709
     lookup : (P * H * W,) int32
-        Front entry of each pixel. Pixels just outside a chart have the entry of a covered neighbour, because
-        rounding may move a hit on the chart's border to such a pixel. All other pixels have -1.
+        Front entry of each pixel of the P pages. Pixels that are not covered have the entry of one of their
+        eight neighbours, if one is covered, because rounding may move a hit on a chart's border to such a
+        pixel. All other pixels have -1.
     back_entry : (n_front,) int32
         Entry of the back side of each front texel, or -1.
     region : (n_front,) int32
-        Index of a connected part of the chart that no other surface cuts, see `baker.radiosity.sides`. If no
-        surface cuts the chart, it is the index of the chart.
+        Index of the part of the texel's chart, if other surfaces cut the chart into parts, see
+        `baker.radiosity.sides`. Otherwise the index of the chart.
     """
 
     resolution: int
@@ -80,9 +82,9 @@ class TexelBuffer:
     def hit_image(self, value: NDArray[Any], fill: float | int = 0) -> NDArray[Any]:
         """Return (P * H * W, ...): for each pixel the value of its entry in `lookup`.
 
-        Pixels without an entry have the value `fill`. If the buffer has back sides, P * H * W rows with the
-        values of the pixels' back entries follow. The index of a row is the result of
-        `baker.kernels.triangle_lookup.hit_pixel`.
+        Pixels without an entry have the value `fill`. If the buffer has entries other than front entries,
+        P * H * W rows with the values of the pixels' back entries follow. Kernels index the rows with the
+        result of `baker.kernels.triangle_lookup.hit_pixel`.
 
         value : (n, ...), values of all entries
         """
@@ -96,9 +98,11 @@ class TexelBuffer:
         return image
 
     def page_image(self, value: NDArray[Any], fill: float | int = 0, page: int | None = None) -> NDArray[Any]:
-        """Return values of front texels (n_front, ...) as images (P, H, W, ...), or as one image (H, W, ...).
+        """Return the values of front entries as images (P, H, W, ...), or one page as an image (H, W, ...).
 
-        Texels without an entry have the value `fill`. If `page` is given, only that page is returned.
+        value : (m, ...) with m >= n_front; the first n_front rows are read
+        fill : value of pixels without an entry
+        page : index of the page to return; None for all pages
         """
         pixels = self.resolution * self.resolution
         pixel, value = self.pixel[: self.n_front], value[: self.n_front]
@@ -113,7 +117,10 @@ class TexelBuffer:
         return image.reshape(shape if page is not None else (n_pages, *shape))
 
     def with_copies(self, entry: NDArray[np.int32]) -> TexelBuffer:
-        """Return the buffer with copies of the entries `entry` (m,) appended. `lookup` refers to no copy."""
+        """Return the buffer with copies of the entries `entry` (m,) appended.
+
+        Only arrays of shape (n, ...) grow; `lookup` and `back_entry` do not refer to the copies.
+        """
         names = ("pixel", "back", "chart", "instance", "area", "position", "normal", "albedo")
         longer: dict[str, Any] = {
             name: np.concatenate([getattr(self, name), getattr(self, name)[entry]]) for name in names
