@@ -19,11 +19,11 @@ from baker.io.bake.output_folder import MANIFEST_NAME
 from baker.io.bake.read_manifest import read_manifest
 from baker.io.regular_file import read_regular
 
-# Number of entries of the scene's folder that are searched for `bake.json`.
+# Largest number of entries of the scene's folder, in alphabetical order, that are searched for `bake.json`.
 # Size above which a manifest is not read, bytes.
 _MOST_FOLDERS, _MOST_BYTES = 200, 1 << 24
-# Stages whose time is proportional to the number of texels, stages whose time is proportional to the number
-# of triangles, and stages whose time is proportional to their number of rays.
+# Stages whose time is assumed to be proportional to the number of texels, to the number of triangles, and to
+# their number of rays.
 BY_TEXEL = (Stage.TEXELS, Stage.FINISH, Stage.WRITE, Stage.SOLVE)
 BY_TRIANGLE = (Stage.LOAD, Stage.UNWRAP, Stage.RAY_TREE)
 RAY_STAGES = (
@@ -42,7 +42,7 @@ class Rates:
     Attributes
     ----------
     ray : dict of Stage to float
-        Seconds per ray, for each stage that casts rays.
+        Seconds per ray, for those of `RAY_STAGES` whose speed is known.
     texel : float
         Seconds per texel, summed over the stages `BY_TEXEL`.
     triangle : float
@@ -97,8 +97,8 @@ def rates_of(folder: Path) -> Rates:
 def rates_beside(scene: Path) -> Rates | None:
     """Return the speed of the latest bake of a scene in the folders beside the scene file.
 
-    A bake is taken if its manifest names the scene file. The file may have changed after that bake. None is
-    returned if no such bake is found.
+    A folder contains a bake of the scene if its manifest names the scene file. The file may have changed
+    after that bake. None is returned if there is no such folder.
     """
     found: list[tuple[str, str, Rates]] = []
     # Python raises RuntimeError for a loop of symbolic links.

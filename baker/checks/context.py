@@ -24,23 +24,23 @@ from baker.core.scene import Mesh, Scene
 from baker.core.settings import BakeSettings
 from baker.core.source_mesh import SourceInstance, SourceMesh, SourcePrimitive, SourceScene
 
-# Number of vertices of each object in `CheckContext.test_points`.
+# Largest number of points of each object in `CheckContext.test_points`.
 _TEST_POINTS = 8
 
 
 class CheckContext:
     """A scene, the settings of its bake, and values derived from both.
 
-    Each derived value is computed on first use and then stored. A good triangle is one that a bake uses, see
-    `MeshFacts`.
+    Each derived value is computed on first use and then stored. Good triangles are those that a bake uses,
+    see `MeshFacts`.
 
     Attributes
     ----------
     scene : Scene
         The scene, which `load_scene` read for a check (with `lenient=True`) or for a bake.
     source : SourceScene
-        The meshes of the file. In a scene read for a check they include defective triangles. In a scene read
-        for a bake they contain the good triangles only.
+        The meshes of the file. They include defective triangles if the scene was read for a check, and only
+        good triangles if it was read for a bake.
     settings : BakeSettings
         Settings of the bake that the scene is checked for.
     mip : int
@@ -48,9 +48,9 @@ class CheckContext:
     meshes : tuple of MeshFacts
         One for each of `source.meshes`.
     rates : Rates or None
-        Speed of an earlier bake.
+        Speed of an earlier bake, from which the rule `cost` estimates time.
     probe : bool
-        Whether the speed of rays is measured if `rates` is None.
+        Whether the rule `cost` measures the speed of rays if `rates` is None.
 
     Raises
     ------
@@ -93,7 +93,7 @@ class CheckContext:
 
     @cached_property
     def node_named(self) -> dict[str, int]:
-        """Return the node of the first instance of each name."""
+        """Return the node of the first instance with each name, by name."""
         found: dict[str, int] = {}
         for instance in self.source.instances:
             found.setdefault(instance.name, instance.node)
@@ -103,7 +103,8 @@ class CheckContext:
     def test_points(self) -> SortedPoints:
         """Return positions of lights and cameras (owner -1), and some vertices of objects (owner: the node).
 
-        In metres, world space.
+        The vertices are corner 0 of at most `_TEST_POINTS` good triangles of each object. All positions are
+        in metres, world space.
         """
         scene = self.scene
         seen = [*light_positions(scene), *(np.array(camera.position) for camera in scene.cameras)]
@@ -122,9 +123,11 @@ class CheckContext:
 
     @cached_property
     def box(self) -> NDArray[np.float64]:
-        """Return the bounding box of all good triangles, (2, 3) float64: lowest and highest corner.
+        """Return a box around all good triangles, (2, 3) float64, metres, world: lowest and highest corner.
 
-        In metres, world space. Without good triangles the corners are +inf and -inf.
+        The box also contains the corners of the bounding box that each mesh has in object space, so it is
+        larger than the bounding box if instances are rotated. Without good triangles the corners are +inf
+        and -inf.
         """
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for instance in self.source.instances:
@@ -194,9 +197,9 @@ class CheckContext:
 
     @property
     def emits(self) -> bool:
-        """Return whether any triangle emits.
+        """Return whether any good triangle emits.
 
-        A triangle does not emit if the emissive texture is black all over it.
+        A triangle whose emissive texture is black everywhere on the triangle does not emit.
         """
         some = any(max(self.scene.materials[k].emission) > 0 for k in self.used_materials)
         return some and len(self.emission.triangle) > 0
@@ -205,7 +208,7 @@ class CheckContext:
     def levels(self) -> Levels | None:
         """Return direct irradiance at sample points.
 
-        None if the scene has no light or no surface, or if only ambient occlusion is baked.
+        None if the scene has no light or no surface, or if no channel to be baked needs light.
         """
         if not self.bakes_light or not (self.lit or self.emits) or not self.world.area.sum() > 0:
             return None
@@ -225,7 +228,7 @@ class CheckContext:
         return Location(instance.name or self.source.meshes[mesh].name, instance.node)
 
     def to_world(self, mesh: int, point: NDArray[np.floating]) -> tuple[float, float, float]:
-        """Transform a (3,) object-space point to world space, metres, by the mesh's first instance."""
+        """Transform a point (3,) from object space to world space, metres, by the mesh's first instance."""
         instance = self.first_instance.get(mesh)
         matrix = np.eye(4) if instance is None else instance.world_from_object
         x, y, z = (float(v) for v in matrix[:3, :3] @ np.asarray(point, np.float64) + matrix[:3, 3])
@@ -233,7 +236,7 @@ class CheckContext:
 
 
 def source_scene_of(scene: Scene) -> SourceScene:
-    """Return a source scene that shares the arrays of a scene read for a bake."""
+    """Return a source scene made of the meshes and instances of a scene read for a bake."""
     meshes = tuple(SourceMesh(mesh.name, _primitives(mesh)) for mesh in scene.meshes)
     stand = tuple(SourceInstance(i.node, i.name, i.mesh, i.world_from_object) for i in scene.instances)
     return SourceScene(meshes, stand)

@@ -1,10 +1,12 @@
 """Estimates direct irradiance at a few hundred points of a scene without a bake, for rules about light.
 
-    E = sum I cos / r^2  +  sum L cos cos' A / r^2  +  pi L_sky
+    E = sum I w  +  sum L cos cos' A / r^2  +  pi L_sky
 
-The first sum is over lights without area (intensity I), the second over emitters (radiance L, area A), and
-L_sky is the radiance of the sky. r is the distance to the light. cos and cos' are the cosines at the point
-and at the emitter. Each term is multiplied by visibility.
+The first sum is over lights without area of intensity I. w is the result of `LightKind.fill`, which is
+cos / r^2 for a point light without a range. The second sum is over emitters of radiance L and area A. L_sky
+is the radiance of the sky. r is the distance to the light. cos and cos' are the cosines at the point and at
+the emitter. Each term is multiplied by visibility. Every triangle blocks all light, even if its material is
+transparent.
 """
 
 from __future__ import annotations
@@ -21,8 +23,8 @@ from baker.core.light_kind import kind_of
 from baker.core.scene import PunctualLight, Scene
 from baker.core.settings import BakeSettings
 
-# Number of sample points, a multiple of 16.
-# Rays from each point to emitters, and rays from each point for the sky.
+# Number of sample points, a multiple of 16; rays from each point to emitters; rays from each point to the
+# sky.
 POINTS, EMITTER_RAYS, SKY_RAYS = 512, 16, 16
 # Number of points at which the light of both sides is compared, a multiple of 16.
 SIDE_POINTS = 2048
@@ -37,7 +39,7 @@ class Levels:
     ----------
     position : (n, 3) float64, metres, world, relative to `Scene.origin`
     irradiance : (n,) float64, lx
-        The largest of the components R, G and B.
+        The largest of the components R, G and B at each point.
     triangle : (n,) int64
         Index in `WorldTriangles` of the triangle on which each point lies.
     """
@@ -50,7 +52,7 @@ class Levels:
 def estimate_levels(
     scene: Scene, world: WorldTriangles, emission: Emission, settings: BakeSettings
 ) -> Levels:
-    """Estimate direct irradiance at random points on the fronts of all triangles, stratified by area.
+    """Estimate the direct irradiance of the fronts of triangles at random points, stratified by area.
 
     Parameters
     ----------
@@ -89,12 +91,12 @@ def estimate_levels(
 
 @dataclass(frozen=True)
 class SideLight:
-    """Direct light of lights with a position and of emitters on both sides of surfaces.
+    """Direct irradiance of both sides of surfaces, from emitters and lights with a position only.
 
     Attributes
     ----------
     front, back : (n,) float64, lx
-        Sum of the components R, G and B.
+        Sum of the components R, G and B of the irradiance of the front and of the back at each point.
     triangle : (n,) int64
         Index in `WorldTriangles` of the triangle on which each point lies.
     """
@@ -105,7 +107,7 @@ class SideLight:
 
 
 def side_light(scene: Scene, world: WorldTriangles, emission: Emission, seed: int) -> SideLight:
-    """Estimate the light of lights with a position and of emitters on both sides at random points.
+    """Estimate the direct irradiance of both sides of triangles, from emitters and lights with a position.
 
     Parameters
     ----------
@@ -121,7 +123,7 @@ def side_light(scene: Scene, world: WorldTriangles, emission: Emission, seed: in
     Returns
     -------
     SideLight
-        `SIDE_POINTS` points, stratified by area, with the light on their two sides.
+        The irradiance at `SIDE_POINTS` random points on all triangles, stratified by area.
     """
     random = np.random.default_rng(seed)
     position, normal, triangle = spread_points(world, SIDE_POINTS, random)
@@ -159,8 +161,8 @@ def points_inside(
 ) -> NDArray[np.float64]:
     """Return one uniform random point inside each triangle, (n, 3) float64, metres.
 
-    `part` (n, 3) has one row of `Emission.inside` for each triangle. If it is given, the point lies in this
-    part of the triangle.
+    If `part` (n, 3) is given, its rows are rows of `Emission.inside`, and each point lies in that part of its
+    triangle.
     """
     u, v = random.random((2, len(triangle)))
     over = u + v > 1.0
@@ -198,7 +200,8 @@ def _emissive(
 ) -> NDArray[np.float64]:
     """Return the irradiance at (n, 3) points from emitters, (n, 3) float64, lx.
 
-    Monte Carlo estimate: rays aim at points on emitters chosen with probability proportional to power.
+    This is a Monte Carlo estimate with `EMITTER_RAYS` rays from each point to random points on emitters. The
+    probability of an emitter is proportional to its area times the luminance of its radiance.
     """
     power = found.area * (found.radiance @ _LUMINANCE)
     total = np.zeros((len(origin), 3))

@@ -1,4 +1,4 @@
-"""Finds the emissive triangles, with the mean radiance of each triangle or of each of its parts."""
+"""Finds the emissive triangles, and the mean radiance of each triangle or of parts of it."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from baker.checks.world_triangles import WorldTriangles
 from baker.core.scene import Texture
 
-# Triangles with an emissive texture are subdivided into parts. This is the largest number of parts, over all
-# triangles together, minus the number of these triangles.
+# Triangles with an emissive texture are subdivided into parts. This limits the number of parts of all
+# triangles together minus the number of these triangles.
 _MOST_PARTS = 2048
 
 
 @dataclass(frozen=True)
 class Emission:
-    """E emitting surfaces: whole triangles without emissive texture, and parts of triangles with one.
+    """E emitting surfaces: triangles without emissive texture, and parts of triangles with emissive texture.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Emission:
 
 
 def find_emission(world: WorldTriangles) -> Emission:
-    """Return the triangles and parts of triangles that emit; those with black texture are left out."""
+    """Return the emitting triangles and parts of triangles; parts whose texture is black are left out."""
     materials = world.materials
     factor = np.array([m.emission for m in materials], np.float64).reshape(-1, 3)
     emits = np.flatnonzero((factor.max(axis=1, initial=0.0) > 0)[world.material] & (world.area > 0))

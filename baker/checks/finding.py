@@ -48,7 +48,7 @@ class RawFinding:
     percent : float or None
         Share of the object that is defective, percent.
     primitive : int or None
-        Index of the primitive of the first defective face.
+        Index of the primitive of the first defective face, in its mesh.
     faces : tuple of int
         Up to `MOST_FACES` defective faces, as numbers within their primitive.
     pairs : tuple of (int, int)

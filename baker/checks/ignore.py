@@ -1,6 +1,7 @@
 """Parses patterns of accepted findings, which do not fail a check.
 
-A pattern is `CODE` or `CODE@OBJECT`. Both parts may contain `*` for any letters.
+A pattern is `CODE` or `CODE@OBJECT`. In both parts, `*` matches any characters, `?` one character, and `[ab]`
+one of the characters in brackets. Case matters.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ class Ignore:
     Attributes
     ----------
     code, object : str
-        Patterns for the code and for the name of the object, with `*` for any letters.
+        Patterns for the code and for the name of the object.
     """
 
     code: str

@@ -1,4 +1,4 @@
-"""Runs the rules that are part of every bake: defects that neither importer nor unwrapper reports."""
+"""Runs the rules that are part of every bake and find defects that neither importer nor unwrapper reports."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from baker.core.settings import BakeSettings
 def bake_warnings(scene: Scene, settings: BakeSettings) -> list[SceneWarning]:
     """Return warnings about a scene before it is baked.
 
-    The importer warns of unusable faces, and the unwrapper of lightmap uv that cannot be kept. Both use the
-    codes of `baker check`. This function runs the rules `inside-out`, `invisible` and `collision-hull`, and
-    for bakes of light also `light-range`.
+    This function runs the rules `inside-out`, `invisible` and `collision-hull`, and for bakes of light also
+    `light-range`. The importer warns of unusable faces, and the unwrapper of lightmap uv that cannot be kept.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ from baker.io.junit import Case, junit_text
 def check_junit(reports: Sequence[CheckReport]) -> str:
     """Return the JUnit document.
 
-    A case fails if its rule has a finding of the severity `fail_on` or a higher one.
+    A case fails if its rule has a finding of the severity `fail_on` or a higher one that is not ignored.
 
     Parameters
     ----------

@@ -23,14 +23,14 @@ from baker.topology.weld import number_by_first
 class MeshFacts:
     """A mesh of the file, with V vertices and T triangular faces.
 
-    Faces are numbered from 0 to T - 1 over all primitives. Degenerate triangles that only join the pieces of
-    a triangle strip are left out.
+    Faces are numbered from 0 to T - 1 over all primitives. Degenerate triangles that only join the parts of a
+    triangle strip are left out and have no number.
 
     The G good faces are those that a bake uses: their indices and coordinates are valid, they have area, and
     they repeat no earlier face. Arrays of shape (G, ...) have one entry for each entry of `good`.
 
-    The S sheet faces are the good faces that share their three positions with no other good face. Edges and
-    pieces are those of sheet faces.
+    The S sheet faces are the good faces whose three positions are not those of another good face. A piece is
+    a set of sheet faces that are connected by edges. Edges and pieces are computed from sheet faces only.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class MeshFacts:
     triangle : (T, 3) int64
         Indices into `position`, possibly out of range.
     primitive, local : (T,) int64
-        Primitive of each face, and the number of the face within the primitive.
+        Index into `source.primitives` of each face's primitive, and the number of the face in this primitive.
     material : (T,) int32
         Material index of each face.
     trusted : bool
@@ -57,7 +57,7 @@ class MeshFacts:
         for k, p in enumerate(source.primitives):
             number = np.arange(len(p.triangle))
             if p.stitched:
-                # Drop triangles with a repeated index, which only join the pieces of a triangle strip.
+                # Drop triangles with a repeated index, which only join the parts of a triangle strip.
                 t = p.triangle
                 number = number[(t[:, 0] != t[:, 1]) & (t[:, 1] != t[:, 2]) & (t[:, 2] != t[:, 0])]
             parts.append(p.triangle[number] + start[k])
@@ -123,7 +123,10 @@ class MeshFacts:
 
     @cached_property
     def bounds(self) -> NDArray[np.float64]:
-        """Return the bounding box of the good faces, (2, 3) float64, object space: lowest, highest corner."""
+        """Return the bounding box of the good faces, (2, 3) float64, object space: lowest, highest corner.
+
+        There must be a good face.
+        """
         used = self.position[self.triangle[self.good].reshape(-1)].astype(np.float64)
         return np.stack([used.min(axis=0), used.max(axis=0)])
 
@@ -155,7 +158,7 @@ class MeshFacts:
 
     @cached_property
     def single(self) -> NDArray[np.bool_]:
-        """Return (G,) bool: the good faces that share their three positions with no other good face."""
+        """Return (G,) bool: the good faces whose three positions are not those of another good face."""
         ordered = np.sort(self.welded, axis=1)
         n = int(ordered.max(initial=0)) + 1
         # Hash the three vertex numbers of a face, because a unique key may need more than 64 bits.
@@ -201,7 +204,7 @@ class MeshFacts:
     def volume(self) -> NDArray[np.float64]:
         """Return the signed volume of each piece, (P,) float64, object space.
 
-        It is positive if the fronts point outwards, and defined for pieces that are `closed`.
+        It is meaningful only for pieces that are `closed`, and positive if their fronts point outwards.
         """
         corner = self.corner[self.sheet]
         corner = corner - corner.mean(axis=(0, 1))
@@ -209,13 +212,13 @@ class MeshFacts:
         return np.bincount(self.piece, six / 6.0, minlength=self.n_pieces).astype(np.float64)
 
     def flag(self, material: NDArray[np.int32], read: Callable[[Material], bool]) -> NDArray[np.bool_]:
-        """Return (n,) bool: the flag that `read` returns for each material index of `material` (n,)."""
+        """Return (n,) bool: the result of `read` for the material at each index of `material` (n,)."""
         return flag_of_faces(self.materials, material, read)
 
     def named(self, faces: NDArray[np.integer], most: int = 10) -> tuple[int, ...]:
-        """Return the first `most` of the faces (n,) as numbers within their primitives."""
+        """Return the numbers in their primitives (`local`) of the first `most` of the faces (n,)."""
         return tuple(int(k) for k in self.local[faces[:most]])
 
     def primitive_of(self, faces: NDArray[np.integer]) -> int | None:
-        """Return the index in the file of the primitive of the first of the faces (n,), None if n is 0."""
+        """Return the number in the mesh of the primitive of the first of the faces (n,), None if n is 0."""
         return int(self.source.primitives[self.primitive[faces[0]]].index) if len(faces) else None

@@ -9,7 +9,7 @@ from baker.checks.finding import SEVERITIES, Finding, finding_json
 from baker.checks.run import CheckReport
 from baker.checks.scenes import Unreadable
 
-# Number of findings of one code that are written without `verbose`.
+# Largest number of findings of one code and severity that are written without `verbose`.
 SHOWN = 3
 
 
@@ -56,7 +56,7 @@ def report_json(reports: Sequence[CheckReport], unreadable: Sequence[Unreadable]
 
 
 def write_text(report: CheckReport, stream: TextIO, *, verbose: int = 0, cost: bool = False) -> None:
-    """Write the findings of each code as a group with its advice, then a summary line.
+    """Write the findings as groups of equal severity and code, each with its advice, then a summary line.
 
     Parameters
     ----------
@@ -65,10 +65,10 @@ def write_text(report: CheckReport, stream: TextIO, *, verbose: int = 0, cost: b
     stream : TextIO
         Text stream to write to.
     verbose : int
-        If above 0, findings of severity info, all findings of a group, face numbers and the share of each
-        object are written as well.
+        If above 0, the text also has findings of severity info, all findings of each group, and numbers of
+        faces.
     cost : bool
-        Whether the finding `cost` is written, with the share of each object.
+        Whether the text has the finding `cost`, even if `verbose` is 0.
     """
     groups: dict[tuple[str, str], list[Finding]] = {}
     for finding in report.findings:

@@ -1,7 +1,7 @@
 """Registers the rules of `baker check`, with the severity, advice and documentation of each rule.
 
 A rule is a function that finds one kind of defect: it takes a `CheckContext` and yields `RawFinding` objects.
-The code of a rule is its name in reports, such as `zero-area-faces`. A rule is decorated with `check` and
+The code of a rule is its name in reports, such as `zero-area`. A rule is decorated with `check` and
 defined in a file of `baker/checks/rules/`. The docstring of a rule is its section of docs/CHECKS.md: the
 first line names the defect, and the other lines describe the effect of the defect and the test for it.
 """
@@ -39,9 +39,9 @@ class Check:
     function : callable
         The rule itself.
     in_bake : bool
-        Whether docs/CHECKS.md marks the rule with "in a bake". These are the rules that
-        `baker.checks.in_bake` runs in every bake. The rule `light-range` is not marked,
-        because `in_bake` runs it only in bakes of light.
+        Whether docs/CHECKS.md marks the rule with "in a bake". Marked are the rules that
+        `baker.checks.in_bake` runs in every bake. The rule `light-range` is not marked, because it runs only
+        in bakes of light.
     """
 
     code: str
@@ -77,7 +77,7 @@ def check(
     fix : str
         One line of advice, without a full stop.
     in_bake : bool
-        Whether docs/CHECKS.md marks the rule as part of every bake, see `Check`.
+        See `Check`.
 
     Returns
     -------

@@ -34,7 +34,7 @@ class CheckReport(Result):
     findings : tuple of Finding
         Findings that are not ignored, sorted by severity (errors first), then by code and object.
     ignored : tuple of Finding
-        Findings that match the setting `ignore`.
+        Findings that match a pattern of the setting `ignore` or of the scene's extras.
     fail_on : str
         Lowest severity that fails the check.
     seconds : float
@@ -57,7 +57,7 @@ class CheckReport(Result):
         return all(finding.rank < limit for finding in self.findings)
 
     def summary(self) -> dict[str, Any]:
-        """Return the names and values that the short text shows."""
+        """Return the names and values that `repr` and notebooks show."""
         counts = Counter(finding.severity for finding in self.findings)
         return {
             "scene": self.path.name,
@@ -66,7 +66,7 @@ class CheckReport(Result):
         }
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the report as values that JSON can represent."""
+        """Return the report as JSON-serialisable values, with the number of ignored findings."""
         return {
             "scene": str(self.path),
             "passed": self.passed,
@@ -88,7 +88,8 @@ def check_scene(
     Parameters
     ----------
     scene : Scene, Path or str
-        A scene, or the path of a scene file. A file is read leniently: most defects become findings.
+        A scene, or the path of a scene file. A file is read with `lenient=True`, so that most defects become
+        findings.
     settings : CheckSettings
         Settings of the check. The settings in the scene's extras are added.
     bake_settings : BakeSettings
@@ -104,7 +105,7 @@ def check_scene(
     Raises
     ------
     InputError
-        If the file cannot be read at all.
+        If the file cannot be read, or a light is of an unknown kind.
     SettingsError
         If `ignore` has an unknown code, `rates` is not the folder of a bake, or the scene's extras have wrong
         values.

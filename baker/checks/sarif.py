@@ -1,4 +1,4 @@
-"""Writes the result of a check as SARIF, a format that code hosts show beside the checked files.
+"""Writes the result of a check as SARIF, a format of findings that code hosts display.
 
 Based on: OASIS, Static Analysis Results Interchange Format (SARIF) Version 2.1.0, 2020.
 """
@@ -26,7 +26,8 @@ def sarif_log(reports: Sequence[CheckReport], folder: Path) -> dict[str, Any]:
     reports : sequence of CheckReport
         One for each scene.
     folder : Path
-        Scenes below this folder get URIs relative to it. Code hosts resolve these in the repository.
+        Folder that the URIs of scenes below it are relative to, usually the root of a repository. Other
+        scenes have absolute URIs.
 
     Returns
     -------

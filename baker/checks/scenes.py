@@ -1,4 +1,4 @@
-"""Finds the scene files in paths, folders and patterns, and checks them one after the other."""
+"""Finds the scene files that paths, folders and patterns name, and checks them one after the other."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def find_scenes(paths: Sequence[Path]) -> list[Path]:
     ----------
     paths : sequence of Path
         Paths of files, folders, or patterns with `*`, `?` or `[`. A folder stands for all scene files in it
-        and in its subfolders.
+        and in its subfolders. A pattern stands for all files and folders that match it, of any format.
 
     Returns
     -------
@@ -41,7 +41,7 @@ def find_scenes(paths: Sequence[Path]) -> list[Path]:
     Raises
     ------
     InputError
-        If a folder or a pattern contains no scene file.
+        If a folder contains no scene file, or a pattern matches nothing.
     """
     known = set(IMPORTERS.names())
     found: dict[Path, None] = {}
@@ -92,7 +92,7 @@ def check_scenes(
     Raises
     ------
     InputError
-        If the only scene cannot be read.
+        If `paths` has one element, and the file cannot be read.
     SettingsError
         If `ignore` has an unknown code, `rates` is not the folder of a bake, or a scene's extras have wrong
         values.

@@ -1,7 +1,7 @@
 """Defines the settings of a check.
 
-They come from flags or keyword arguments, from the table `[check]` of a configuration file, and from the
-scene's extras.
+The settings come from flags or keyword arguments, from the table `[check]` of a configuration file, and from
+the scene's extras.
 """
 
 from __future__ import annotations
@@ -14,8 +14,7 @@ from baker.core.settings_model import Settings, Texts, setting
 if TYPE_CHECKING:
     from baker.core.scene import Scene
 
-# Default of `mip`: the coarsest mip level at which charts must not bleed into each other; 0 is the page
-# itself.
+# Default of the setting `mip`, a mip level; 0 is the page itself.
 DEFAULT_MIP = 2
 
 
@@ -53,7 +52,9 @@ def with_extras(settings: CheckSettings, scene: Scene) -> CheckSettings:
     """Add the settings in the scene's `extras.baker.check` to settings of a check.
 
     The extras of the document may have `fail_on`, which is used if `settings` has none, and `ignore`. The
-    extras of a node may have `ignore`: a list of codes to ignore for this node, or true for all codes.
+    extras of a node with a mesh may have `ignore`: a code, a list of codes, or true for all codes. These
+    codes are ignored for all objects with the name of the node. The extras of nodes are read only if the
+    scene was loaded with `lenient=True`.
 
     Parameters
     ----------

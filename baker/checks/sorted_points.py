@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 
 class SortedPoints:
-    """Points, each with an owner number, sorted along the axis of their largest extent.
+    """N points, each with the number of its owner, sorted along the axis of their largest extent.
 
-    A query tests only the points whose coordinate on that axis is in the range of the box.
+    A query for a box tests only the points whose coordinate on this axis is in the range of the box.
 
     Parameters
     ----------

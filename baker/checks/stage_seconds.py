@@ -1,4 +1,4 @@
-"""Estimates the seconds of each stage of a bake before its scene is read, for the progress of the bake."""
+"""Estimates the duration of each stage of a bake before the scene is read, for the progress bar."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from baker.core.parallel import thread_count
 from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
 
-# Seconds times threads for each ray, used if there is no earlier bake. Measured on interior.glb with 1024
-# texels a side, see docs/PERFORMANCE.md.
+# Seconds times threads per ray, with the number of rays as `Workload.rays` estimates it. They are used for
+# stages whose speed in an earlier bake is unknown. Measured on interior.glb with 1024 texels a side, see
+# docs/PERFORMANCE.md.
 _RAY_SECONDS: Mapping[Stage, float] = {
     Stage.INSIDE_GEOMETRY: 3.2e-7,
     Stage.DIRECT_LIGHT: 1.2e-7,
@@ -21,15 +22,15 @@ _RAY_SECONDS: Mapping[Stage, float] = {
     Stage.FINAL_GATHER: 1.7e-7,
     Stage.AMBIENT_OCCLUSION: 1.7e-7,
 }
-# Seconds times threads for each texel: of stages without rays, of the stage `FINISH` without the denoiser,
-# and of the denoiser.
+# Seconds times threads per texel, for three stages, for the stage `FINISH` without the denoiser, and for the
+# denoiser.
 _TEXEL_SECONDS: Mapping[Stage, float] = {Stage.TEXELS: 1.5e-6, Stage.TEXEL_SIDES: 6e-7, Stage.WRITE: 2e-6}
 _FINISH_SECONDS, _DENOISE_SECONDS = 5e-6, 1e-5
-# Seconds of stages that depend on the scene, which is not yet known.
+# Assumed seconds of stages whose duration depends on the scene, because the scene is not read yet.
 _SCENE_SECONDS: Mapping[Stage, float] = {
     Stage.LOAD: 0.1, Stage.UNWRAP: 1.0, Stage.RAY_TREE: 0.05, Stage.SOLVE: 0.2
 }  # fmt: skip
-# Assumed area of the scene if `density` is set, in areas of a page, because the scene is not read yet.
+# Assumed number of texels on surfaces if `density` is set, divided by the number of texels of a page.
 _ASSUMED_PAGES = 1.0
 
 
@@ -41,7 +42,8 @@ def stage_seconds(settings: BakeSettings, scene: Path) -> dict[str, float]:
     settings : BakeSettings
         Settings of the bake.
     scene : Path
-        The scene file. If a bake of it is in a folder beside it, the speed of that bake is used.
+        The scene file. If there is a bake of this file in a folder beside it, the estimate uses the rays per
+        second of that bake, and its seconds per texel for the stage `FINISH`.
 
     Returns
     -------
@@ -65,7 +67,7 @@ def stage_seconds(settings: BakeSettings, scene: Path) -> dict[str, float]:
 
 
 def _seconds_per_ray(stage: Stage, rates: Rates | None, threads: int) -> float:
-    """Return the seconds per ray of a stage: of an earlier bake that cast rays in it, else the default."""
+    """Return the seconds per ray of a stage in the earlier bake `rates`, or the default if it is unknown."""
     default = _RAY_SECONDS[stage] / threads
     return default if rates is None else rates.ray.get(stage, default)
 

@@ -1,7 +1,7 @@
 """Estimates the gain of light by reflections between nearly white surfaces, with random paths.
 
 Let s_n be the share of the light that is left after n reflections. Each reflection then keeps a share of
-about s_n^(1/n). All reflections together then multiply light by the sum of the geometric series,
+about s_n^(1/n). The gain is the ratio of all light to direct light. It is the sum of a geometric series,
 1 / (1 - s_n^(1/n)).
 """
 
@@ -22,9 +22,9 @@ MOST_GAIN = 20.0
 
 
 def trapped_gain(context: CheckContext, albedo: NDArray[np.float64]) -> float:
-    """Return the gain of light by reflections at the points at which light is trapped.
+    """Return the gain of light by reflections, as a mean over the points at which light is trapped.
 
-    Light is trapped at a point if the gain along the paths from this point exceeds `MOST_GAIN`.
+    Light is trapped at a point if the gain of the paths from this point exceeds `MOST_GAIN`.
 
     Parameters
     ----------
@@ -36,8 +36,8 @@ def trapped_gain(context: CheckContext, albedo: NDArray[np.float64]) -> float:
     Returns
     -------
     float
-        Factor by which all reflections together multiply the light. It is 1 if the scene has no surface, or
-        if light is trapped nowhere.
+        The gain that follows from the mean share s_n over all points at which light is trapped, n =
+        `REFLECTIONS`. It is 1 if the scene has no surface, or if light is trapped nowhere.
     """
     world = context.world
     if not world.area.sum() > 0:

@@ -49,7 +49,7 @@ class UvFacts:
 
     @cached_property
     def valid(self) -> bool:
-        """Return whether there are faces with this uv set, and all their uv are finite and inside 0..1."""
+        """Return whether F > 0, and all uv are finite and inside 0..1 within `RANGE_SLACK`."""
         return bool(len(self.rows)) and bool(self.finite.all()) and not self.outside.any()
 
     @cached_property
@@ -74,7 +74,7 @@ class UvFacts:
     def chart(self) -> NDArray[np.int32]:
         """Return the chart of each face, (F,) int32.
 
-        Faces that share a corner with the same position and the same uv are of one chart.
+        Faces that share a corner with the same position and the same uv are parts of one chart.
         """
         label = weld(self.facts.position, self._vertex)
         return connected_vertices(label[self.triangle], int(label.max(initial=-1)) + 1)
@@ -85,5 +85,5 @@ class UvFacts:
         return int(self.chart.max(initial=-1)) + 1
 
     def per_chart(self, value: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the sum over each chart of one value per face (F,), as (C,) float64."""
+        """Return (C,) float64: for each chart, the sum of the values (F,) of its faces."""
         return np.bincount(self.chart, value, self.n_charts).astype(np.float64)

@@ -1,4 +1,7 @@
-"""Collects the triangles of all instances in world space, and traces rays against them for checks."""
+"""Collects the good triangles of all instances in world space, and traces rays against them for checks.
+
+Every triangle stops rays, even if its material is transparent.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +51,7 @@ class WorldTriangles:
         Index of the triangle's instance in `instances`.
     face : (T,) int64
         Index of the triangle's face in the `MeshFacts` of its mesh.
-    normal : (T, 3) float64, unit
+    normal : (T, 3) float64, unit, world; 0 for triangles without area
     area : (T,) float64, m2
     material : (T,) int32
     double_sided : (T,) bool
@@ -99,14 +102,14 @@ class WorldTriangles:
 
     @cached_property
     def size(self) -> NDArray[np.float64]:
-        """Return the largest x, y or z extent of the edges from corner 0, for each triangle, (T,), metres."""
+        """Return (T,) metres: the largest |x|, |y| or |z| of the two edges at corner 0 of each triangle."""
         corner = self.position[self.triangle].astype(np.float64)
         return np.asarray(np.abs(corner[:, 1:] - corner[:, :1]).max(axis=(1, 2), initial=0.0))
 
     def lifted(
         self, point: NDArray[np.float64], triangle: NDArray[np.int64], normal: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return ray origins (n, 3): points on (n,) triangles, moved off the surface along (n, 3) normals."""
+        """Return ray origins (n, 3): points (n, 3) on triangles (n,), moved along normals (n, 3)."""
         # Import the module here, because it imports the compiler.
         from baker.kernels.surface import OFFSET, ROUNDING
 

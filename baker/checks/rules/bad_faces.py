@@ -27,17 +27,17 @@ def faces_found(
     mesh : int
         Index into `context.meshes`.
     faces : (n,) int
-        Indices of the faces in the mesh. The primitive and position of the finding are those of the first
-        face.
+        Indices of the faces in the mesh. The primitive of the finding is that of the first face. The position
+        is the centroid of the first face, or its first usable corner if not all its corners are usable.
     what : str
         The message. `{n}` is replaced by n, and `{some}` by "1 face" or "n faces".
     whole : int or None
-        The number of faces that is 100 %. By default, the number of all faces of the mesh.
+        The number of faces that is 100 %. By default, it is the number of all faces of the mesh.
 
     Returns
     -------
     RawFinding
-        The finding, with count, percentage, position and the numbers of the first faces.
+        The finding, with count, percentage, position (if there is one) and the numbers of the first faces.
     """
     facts = context.meshes[mesh]
     n = len(faces)
@@ -71,7 +71,7 @@ def _each(context: CheckContext) -> Iterator[tuple[int, MeshFacts]]:
     fix="export the mesh again: its index buffer belongs to other vertices",
 )
 def index_range(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces whose index buffer refers to a vertex that does not exist.
+    """Faces that refer to a vertex that does not exist.
 
     The index buffer was probably made for other vertices. A bake stops with an error.
     """
@@ -88,7 +88,7 @@ def index_range(context: CheckContext) -> Iterator[RawFinding]:
     fix="delete or repair these vertices where the mesh was made; a bake leaves their faces out",
 )
 def bad_vertices(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces with a corner whose position is NaN, infinite or above 1e18.
+    """Faces with a corner that has a NaN or infinite coordinate, or one with a magnitude above 1e18.
 
     A bake leaves these faces out. Light leaks through the holes.
     """
@@ -108,8 +108,8 @@ def zero_area_faces(context: CheckContext) -> Iterator[RawFinding]:
     """Faces without area, collapsed to a line or a point.
 
     Such faces are invisible, and a bake leaves them out. If the face was meant to have an area, there is a
-    hole instead. A face has no area if its height is below 1e-7 of its longest side, because rounding errors
-    then determine its normal.
+    hole instead. A face counts as having no area if its height is at most 1e-7 times its longest side,
+    because rounding errors then determine its normal.
     """
     for m, facts in _each(context):
         bad = np.flatnonzero(facts.flat)
@@ -126,9 +126,9 @@ def zero_area_faces(context: CheckContext) -> Iterator[RawFinding]:
 def sliver_faces(context: CheckContext) -> Iterator[RawFinding]:
     """Slivers: faces whose height is less than a fiftieth of their longest side.
 
-    A sliver has few texels: at a length of 50 texels it is less than one texel high. The thinner it is, the
-    larger is the rounding error of its normal. `repair` uses the same limit: it remeshes meshes of at least
-    500 faces if a tenth of the faces are slivers.
+    A sliver up to 50 texels long is less than one texel high. The thinner a sliver is, the larger is the
+    rounding error of its normal. `repair` uses the same limit: it remeshes meshes of at least 500 faces if a
+    tenth of the faces are slivers.
     """
     for m, facts in _each(context):
         if not len(facts.good):
@@ -145,11 +145,11 @@ def sliver_faces(context: CheckContext) -> Iterator[RawFinding]:
     fix="remove doubles (`fix` drops them); a bake keeps the first of each",
 )
 def duplicate_faces(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces with the same three positions as another face of the mesh.
+    """Faces with the same three positions as an earlier face of the mesh.
 
     Two surfaces at the same position shadow each other at random. A bake keeps only the first face, but
-    engines keep both. Two faces with opposite winding are front and back of a sheet. They are reported only
-    if their material is double-sided.
+    engines keep both. Two faces with opposite winding usually are front and back of a sheet. The second of
+    them is reported only if both have the same double-sided material.
     """
     for m, facts in _each(context):
         bad = np.flatnonzero(facts.repeated)

@@ -9,7 +9,8 @@ from baker.checks.context import CheckContext
 from baker.checks.finding import Location, RawFinding
 from baker.checks.rule import check
 
-# Line 1: prefixes of Unreal and suffixes of Godot. Line 2: English words at the end of a name.
+# Line 1: prefixes of Unreal and suffixes of Godot. Line 2: words at the end of a name, with or without a
+# number.
 _NAME = re.compile(
     r"^(ucx|ubx|usp|ucp|mcdcx)_|-(colonly|convcolonly|navmesh|occonly)\b"
     r"|(^|[_.\- ])(collision|collider|hitbox)([_.\- ]?\d*)$",
@@ -28,8 +29,9 @@ def collision_hull(context: CheckContext) -> Iterator[RawFinding]:
     """An object with the name of a collision hull.
 
     Engines do not show collision hulls. In a bake they block light like all other meshes, so surfaces inside
-    them are black. These names are recognised: Unreal's prefixes UCX_, UBX_, USP_, UCP_ and MCDCX_; Godot's
-    suffixes -colonly, -convcolonly, -navmesh and -occonly; names that end in collision, collider or hitbox.
+    them are black. A hull is recognised by the name of its node or mesh: Unreal's prefixes UCX_, UBX_, USP_,
+    UCP_ and MCDCX_; Godot's suffixes -colonly, -convcolonly, -navmesh and -occonly; the words collision,
+    collider and hitbox at the end, also with a number. Case is ignored.
     """
     for instance in context.source.instances:
         name = next(

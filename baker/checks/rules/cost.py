@@ -20,28 +20,28 @@ from baker.core.stage import Stage
 
 # Constants of the time estimate if there is no earlier bake, measured on the scenes cornell.glb, hall.glb and
 # interior.glb:
-# _OF_PROBE: number of rays that a bake traces in the time in which the probe traces one ray;
-# _PER_TEXEL_SECONDS: time per texel of all stages without rays, seconds, multiplied by the number of threads.
+# _OF_PROBE: mean number of rays that a bake traces in the time in which the probe traces one ray;
+# _PER_TEXEL_SECONDS: time per texel of all stages without rays, multiplied by the number of threads, seconds.
 _OF_PROBE, _PER_TEXEL_SECONDS = 1.7, 1.5e-5
-# Duration of the probe, seconds.
+# Minimum duration of the probe, seconds.
 PROBE_SECONDS = 1.0
-# Largest number of objects whose share of the cost is listed.
+# Largest number of objects whose share of the texels is listed.
 MOST_SHARES = 20
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Estimated cost of a bake. Numbers of rays are upper bounds, because texels may need fewer rays.
+    """Estimated cost of a bake.
 
     Attributes
     ----------
     texels, pages, triangles : int
     rays : dict of Stage to int
-        Number of rays of each stage.
+        Number of rays of each stage, see `Workload.rays`.
     bytes : int
         Peak memory, bytes.
     shares : list of dict
-        The objects with the largest area, and the share of each.
+        Name, node, share of the area in percent and number of texels of the objects with the largest area.
     """
 
     texels: int
@@ -88,10 +88,7 @@ def estimate_cost(context: CheckContext) -> Cost:
 
 
 def _shares(context: CheckContext, area: NDArray[np.float64], texels: int) -> list[dict[str, Any]]:
-    """Return the instances with the largest area, with their share of the area and of the texels.
-
-    `area` (I,), m2, is the area of each instance.
-    """
+    """Return `Cost.shares`. `area` (I,), m2, is the area of each instance."""
     order = np.argsort(-area, kind="stable")[:MOST_SHARES]
     total = max(float(area.sum()), 1e-300)
     return [
@@ -106,7 +103,7 @@ def _shares(context: CheckContext, area: NDArray[np.float64], texels: int) -> li
 
 
 def probe(context: CheckContext) -> Rates:
-    """Measure the speed of rays: trace cosine-weighted rays from the surfaces for about one second."""
+    """Measure the speed of rays by tracing cosine-weighted rays from the surfaces for about one second."""
     world = context.world
     random = np.random.default_rng(context.settings.seed)
     share = np.cumsum(world.area)
@@ -132,7 +129,7 @@ def probe(context: CheckContext) -> Rates:
 def seconds_of(cost: Cost, rates: Rates) -> float:
     """Return the estimated duration of a bake, seconds.
 
-    The slowest known rate is used for stages without a rate.
+    For a ray stage whose speed is unknown, the lowest speed of the other ray stages is used.
     """
     slowest = max(rates.ray.values(), default=0.0)
     rays = sum(n * rates.ray.get(stage, slowest) for stage, n in cost.rays.items())
@@ -146,10 +143,10 @@ def cost_of_bake(context: CheckContext) -> Iterator[RawFinding]:
     """The cost of a bake with these settings: texels, pages, rays, memory, and time if known.
 
     Time is estimated from the speed of an earlier bake: the bake that `rates` names, or else the latest bake
-    of this scene in a folder beside the scene file. If there is none and `cost` is set, the speed of rays is
-    measured for one second. Otherwise no time is given. The time does not include unwrapping, which depends
-    on the shapes. `objects` lists the 20 objects with the largest area. An object's share of the area is its
-    share of the texels and approximately its share of the time.
+    of this scene in a folder beside the scene file. If there is no such bake and `cost` is set, the speed of
+    rays is measured for about one second. Otherwise no time is given. The time does not include unwrapping.
+    `objects` lists the 20 objects with the largest area. An object's share of the texels is
+    assumed to equal its share of the area, and is approximately its share of the time.
     """
     if not context.world.area.sum() > 0:
         return

@@ -1,4 +1,4 @@
-"""Reports vertex colours that take away most of the base colour of a material."""
+"""Reports vertex colours that darken the base colour of a material to less than 30 %."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from baker.checks.rule import check
 from baker.checks.rules.vertex_colours import BLACK, COLOURED
 from baker.core.readable import percent
 
-# Mean of the vertex colours below which they count as dark. Base colour factor from which a material without
-# a texture counts as white; vertex colours are then the colour of the surface.
+# DARK: mean vertex colour, over R, G and B and over the surface, below which the colours count as dark.
+# WHITE: smallest component of the base colour factor from which on a material without a texture counts as
+# white. The vertex colours are then the colour of the surface.
 DARK, WHITE = 0.3, 0.9
 
 
@@ -24,12 +25,13 @@ DARK, WHITE = 0.3, 0.9
     fix="take COLOR_0 off the mesh if it has AO, masks or other data; keep it if the surface is dark",
 )
 def dark_colours(context: CheckContext) -> Iterator[RawFinding]:
-    """Vertex colours that take away more than 70 % of the base colour of a coloured material.
+    """Vertex colours that take away more than 70 % of the base colour of a material.
 
-    glTF multiplies the base colour by COLOR_0. If the material has a texture or a colour already, dark vertex
-    colours usually are ambient occlusion or data for the shader of an engine. The surface then reflects too
-    little light. Vertex colours on a white material without a texture are not reported, and black ones have
-    the code `black-colours`.
+    The base colour is multiplied by the vertex colour (COLOR_0 in glTF). If the material already has a
+    texture or a colour, dark vertex colours usually are ambient occlusion or data for the shader of an
+    engine. The surface then reflects too little light. The mean of the vertex colours over the surface is
+    tested. Vertex colours on a white material without a texture are not reported. The rule `black-colours`
+    reports vertex colours that are black everywhere.
     """
     for m, facts in enumerate(context.meshes):
         for k, primitive in enumerate(facts.source.primitives):

@@ -13,8 +13,8 @@ from baker.checks.rule import check
 from baker.core.light_kind import kind_of
 from baker.core.readable import number
 
-# Limit of the median of the direct irradiance of lights with a position, lx. Offices have 500 lx, an overcast
-# day has 10 000 lx.
+# Median of the direct irradiance at sample points above which the lights are reported, lx. Offices have
+# 500 lx, an overcast day has 10 000 lx.
 DAYLIGHT = 10_000.0
 # Luminous efficacy with which exporters convert watts to lumens, lm/W.
 EFFICACY = 683.0
@@ -30,8 +30,9 @@ def daylight_levels(context: CheckContext) -> Iterator[RawFinding]:
     """Point and spot lights that give more than 10 000 lx at half of the surface, as daylight does.
 
     Offices have 500 lx. Blender's lighting mode Standard multiplies watts by 683 lm/W, the efficacy of a
-    perfectly efficient green light. Real lights have 10 to 200 lm/W, so rooms become some ten times too
-    bright. Engines then need a matching exposure. Scenes with sun or sky are left out.
+    perfectly efficient green light. Real lights have 10 to 200 lm/W, so the converted lights are 3 to 70
+    times too bright. Scenes with sun or sky are left out. The irradiance is direct and includes the light of
+    emissive surfaces.
     """
     lights = [light for light in context.scene.local_lights if max(light.intensity) > 0]
     placed = [light for light in lights if kind_of(light).has_position]

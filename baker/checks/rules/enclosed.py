@@ -16,10 +16,11 @@ from baker.topology.solids import BEFORE, BEHIND, Solids, SolidSurfaces, find_so
 # A face is tested at its centroid and at one point near each corner. This is the distance of such a point
 # from its corner, as a share of the distance from the corner to the centroid.
 _DRAWN_IN = 0.02
-# Number of rays from a point that must hit the inner side of a solid for the point to count as inside.
+# Number of the six rays from a point that must hit the inner side of a solid for the point to count as
+# inside.
 _PROOF = 2
-# A ray's direction is the normal plus one of these unit vectors. The vectors are arbitrary, so that rays
-# rarely hit edges of modelled geometry.
+# A ray's direction is the normal of the face plus one of these unit vectors. The vectors are arbitrary, so
+# that rays rarely hit edges of modelled geometry.
 _DIRECTIONS = np.array(
     [
         [0.53, 0.41, 0.743],
@@ -43,12 +44,12 @@ def enclosed_faces(context: CheckContext) -> Iterator[RawFinding]:
 
     Examples are the base of a crate that is sunk into a floor, the end of a wall inside another wall, and
     faces between two boxes that touch. They are never visible and receive no light. A bake marks their texels
-    invalid and fills them from visible neighbours of the same chart. Faces with double-sided materials are
-    reported, too. A closed surface with a light, a camera or most of the scene inside is a room, not a solid.
-    Faces that lie only partly inside a solid are not reported.
+    invalid and fills them from visible neighbours of the same chart. A closed surface with a light, a camera
+    or most of the scene inside is a room, not a solid. A face is reported if its centroid and three points
+    near its corners are inside a solid.
 
-    The rule also reports double-sided faces that bound a solid and whose fronts point into it. Flip these
-    faces, because their lightmap contains the dark inside of the solid.
+    The rule also reports double-sided faces that bound a solid and whose fronts point into the solid. Flip
+    these faces, because their lightmap contains the light of their fronts, and there is none in the solid.
     """
     world = context.world
     if not len(world.triangle):
@@ -107,7 +108,10 @@ def _solids(context: CheckContext, world: WorldTriangles) -> Solids:
 
 
 def _holders(world: WorldTriangles, solids: Solids) -> NDArray[np.int64]:
-    """Return (T,) int64: for each face, the instance of a solid that encloses the whole face, or -1."""
+    """Return (T,) int64: for each face, the instance of a solid around its last test point, or -1.
+
+    It is -1 unless each of the four test points of the face is inside a solid.
+    """
     corner = world.position[world.triangle].astype(np.float64)
     middle = corner.mean(axis=1)
     rows = np.flatnonzero(world.area > 0)

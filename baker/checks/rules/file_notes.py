@@ -8,8 +8,8 @@ from baker.checks.context import CheckContext
 from baker.checks.finding import Location, RawFinding
 from baker.checks.rule import check
 
-# Severity and advice for each code of an importer warning. If a code is also the code of a rule, that rule
-# reports the warning.
+# Severity and advice, by code of the importer's warning. Warnings with the code of a rule are not in this
+# table, because that rule reports the defect.
 NOTES = {
     "broken-attribute": ("warning", "export the attribute again if the level needs it"),
     "broken-camera": ("info", "export the camera again if the level needs it"),
@@ -36,10 +36,10 @@ NOTES = {
 def file_note(context: CheckContext) -> Iterator[RawFinding]:
     """Parts of the file that a bake ignores, or interprets in one of several possible ways.
 
-    The key `note` has the code of the importer's warning. Reported are:
+    The key `note` has the code of the importer's warning. Examples are:
 
     - unknown extensions, and materials of an unknown model;
-    - skins, which are posed by their joints, and morph targets, of which the base shape is baked;
+    - skinned meshes, which are baked in the pose of the file, and morph targets, which are not applied;
     - primitives of points and lines;
     - several scenes in one file;
     - missing texture coordinates or material libraries;

@@ -1,4 +1,4 @@
-"""Reports closed parts of meshes whose fronts point inwards although nothing is inside."""
+"""Reports closed parts of meshes whose fronts point inwards and that contain nothing."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ from baker.checks.rules.bad_faces import faces_found
 from baker.checks.sorted_points import SortedPoints
 from baker.topology.winding_number import first_inside
 
-# Largest value of |sum of area vectors| / total area for a closed mesh. It is 0 except for rounding.
+# Length of the sum of a mesh's area vectors, divided by its area, up to which the sum counts as zero. It is 0
+# for a closed mesh except for rounding.
 _ROUNDING = 1e-4
-# Share of a mesh's area. If the inside-out parts have less than this share, the finding is a warning.
+# Share of a mesh's area. If the inside-out parts have a smaller share, the finding is a warning.
 MOST_WRONG = 0.05
-# Number of points of each other part that are tested whether they are inside the part.
+# Largest number of test points of a part. They are corners 0 of its faces.
 _WITNESSES = 8
 # Condition number of an object's transform above which the object counts as flattened.
 _FLATTENED = 1e6
@@ -38,9 +39,10 @@ def inside_out(context: CheckContext) -> Iterator[RawFinding]:
     """A closed part whose fronts all point inwards, with nothing inside.
 
     From outside, such a part is black and absorbs all light. The fronts of rooms point inwards by design.
-    Parts with a light, a camera or other geometry inside are therefore not reported. Parts that emit, the
-    inner surfaces of shells, and double-sided surfaces are not reported either. If the reported parts make up
-    less than 5 % of an object's surface, the finding is a warning instead of an error.
+    Parts with a light, a camera or other geometry inside are therefore not reported. Parts with an emitting
+    face, parts inside another closed part of the mesh, and parts of which all faces are double-sided are not
+    reported either. If the reported parts make up less than 5 % of the mesh's surface, the finding is a
+    warning instead of an error.
     """
     for m, facts in enumerate(context.meshes):
         wrong = inside_out_parts(context, m)
@@ -89,15 +91,15 @@ def inside_out_parts(context: CheckContext, mesh: int) -> list[NDArray[np.int64]
 
 
 def _may_be(facts: MeshFacts) -> bool:
-    """Return False if fast tests, which need no edges, rule out that a closed part is inside out."""
+    """Return False if fast tests, which need no edges, show that no closed part is inside out."""
     if facts.double_sided.all():
         return False
     if len(facts.good) < 4:
         return False
     total = float(np.linalg.norm(facts.area_vector.sum(axis=0)))
-    # The sign of the volume of the whole mesh is not a sufficient test, because a larger part with positive
-    # volume may hide a part with negative volume. No part is inside out if the area vectors add up to zero
-    # and no front faces the centroid.
+    # The sign of the volume of the whole mesh is not a sufficient test, because the mesh may have a part with
+    # negative volume and a larger part with positive volume. If the area vectors add up to zero and no front
+    # faces the centroid, no part is inside out.
     outward = np.einsum("gx,gx->g", facts.corner[:, 0] - facts.corner.mean(axis=(0, 1)), facts.area_vector)
     return bool((outward < 0).any()) or total > _ROUNDING * float(facts.area.sum())
 
@@ -129,9 +131,9 @@ class _Parts:
 
 
 def _inhabited(context: CheckContext, mesh: int, parts: _Parts, piece: int) -> bool:
-    """Return whether a closed part contains something, or is the inner surface of a shell.
+    """Return whether part number `piece` contains something, or lies in another closed part of the mesh.
 
-    The part is number `piece` of the mesh.
+    Only test points are tested: lights, cameras, and some vertices of other parts and objects.
     """
     facts = parts.facts
     corner = facts.corner[parts.faces(piece)]

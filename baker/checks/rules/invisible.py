@@ -1,7 +1,7 @@
 """Reports objects that are invisible everywhere because of their alpha.
 
-Alpha is factor x texture x vertex alpha. A point is visible if alpha >= cutoff (mode MASK) or if alpha > 0
-(mode BLEND).
+Alpha is factor x texture x vertex alpha. A point is visible if alpha is at least the cutoff (mode MASK) or at
+least `LEAST_ALPHA` (mode BLEND).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from baker.checks.mesh_facts import MeshFacts
 from baker.checks.rule import check
 from baker.core.scene import Material, Texture
 
-# Smallest alpha that counts as visible in mode BLEND: half a level of an 8-bit image.
+# Smallest alpha that counts as visible in mode BLEND, half a level of an 8-bit image.
 LEAST_ALPHA = 0.5 / 255.0
 # Barycentric coordinates of the points of each triangle at which the texture is sampled first.
 _SAMPLES = np.array(
@@ -36,10 +36,10 @@ _SAMPLES = np.array(
 def invisible(context: CheckContext) -> Iterator[RawFinding]:
     """An object that is invisible everywhere because of its alpha.
 
-    Alpha is the product of factor, texture and vertex alpha. It is 0 everywhere (mode BLEND) or below the
-    cutoff everywhere (mode MASK). Such an object neither blocks nor reflects nor emits light. Typical causes
-    are exporters that interpret `Tr` of MTL files as opacity, and alpha channels that were never painted. An
-    object with a visible part is not reported.
+    Alpha is the product of factor, texture and vertex alpha. It is practically 0 everywhere (mode BLEND) or
+    below the cutoff everywhere (mode MASK). Such an object neither blocks nor reflects nor emits light.
+    Typical causes are exporters that interpret `Tr` of MTL files as opacity, and alpha channels that were
+    never painted. An object with a visible part is not reported.
     """
     fades = np.array([material.alpha_mode != "OPAQUE" for material in context.scene.materials], bool)
     if not fades.any():
@@ -70,7 +70,7 @@ def _sentence(materials: list[Material]) -> str:
 
 
 def _seen(facts: MeshFacts, number: int, material: Material) -> bool:
-    """Return whether any face of a mesh with this material, whose index is `number`, is visible."""
+    """Return whether any good face with this material, whose index is `number`, may be visible somewhere."""
     least_alpha = material.alpha_cutoff if material.alpha_mode == "MASK" else LEAST_ALPHA
     face = facts.good[facts.material[facts.good] == number]
     alpha = material.base_colour[3] * _vertex_alpha(facts)[facts.triangle[face]]
@@ -148,8 +148,9 @@ def _any_within(mask: NDArray[np.bool_], uv: NDArray[np.float64], wrap: tuple[st
 def _range(value: NDArray[np.float64], size: int, wrap: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the range [first, last) of texels that each triangle samples along one axis, (T,) int64 each.
 
-    `value` (T, 3) is u or v of the triangles' corners, and `size` the number of texels along this axis. If a
-    triangle crosses from one repeat of the image to the next, its range is the whole image.
+    `value` (T, 3) is u or v of the triangles' corners, and `size` the number of texels along this axis. The
+    range is the whole image if a triangle crosses from one repeat of the image to the next. If `wrap` is
+    "repeat", the range is also the whole image for a triangle within half a texel of the image's border.
     """
     low, high = value.min(axis=1), value.max(axis=1)
     if wrap == "clamp":

@@ -1,4 +1,4 @@
-"""Checks direct irradiance at sample points, as `baker.checks.direct_light` estimates it."""
+"""Checks estimated direct irradiance at sample points (see `baker.checks.direct_light`), and emitters."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from baker.checks.rule import check
 from baker.core.encoding import ALWAYS_WRITTEN, ENCODINGS
 from baker.core.readable import amount, number
 
-# Number of rays from each emissive object that test whether it faces any surface.
+# Number of rays from the emitting faces of each object, and from each of their sides if any is double-sided.
 FACING_RAYS = 64
 
 
@@ -39,8 +39,8 @@ def all_black(context: CheckContext) -> Iterator[RawFinding]:
 def clips_half(context: CheckContext) -> Iterator[RawFinding]:
     """Direct light that is too bright for half floats, whose largest value is 65504.
 
-    Direct irradiance exceeds 65504 lx at some of 512 points on the surfaces. The map stores 65504 there. With
-    `dtype='float'` no value is clipped.
+    Direct irradiance exceeds 65504 lx at some of 512 points on the surfaces. The map stores 65504 there. The
+    rule does not report anything with `dtype='float'`, because floats can store these values.
     """
     levels = context.levels
     if levels is None:
@@ -85,8 +85,9 @@ def light_levels(context: CheckContext) -> Iterator[RawFinding]:
 def emitter_unseen(context: CheckContext) -> Iterator[RawFinding]:
     """An emissive object that faces away from all surfaces.
 
-    None of 64 rays from its front hits a surface, so it lights nothing. One-sided surfaces emit only from
-    their front.
+    None of 64 rays from the fronts of its emitting faces hits a surface, so it lights nothing. If any of
+    these faces is double-sided, 64 rays from the backs are traced as well. One-sided surfaces emit only from
+    their front. Scenes with a single object are not tested.
     """
     if not context.emits or len(context.source.instances) < 2:
         return

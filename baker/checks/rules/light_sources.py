@@ -20,8 +20,8 @@ from baker.topology.winding_number import first_inside
 MOST_REFLECTED = 0.95
 # Albedo above which paths are traced to find trapped light.
 NEARLY_WHITE = 0.98
-# Radiance of a material above which its unit is probably wrong, cd/m2. For lights without area see
-# `LightKind.plausible_max`.
+# Radiance of a material above which its unit is probably wrong, cd/m2. `LightKind.plausible_max` is the same
+# for lights without area.
 ABSURD_EMISSION = 1e8
 # y component of the unit normal above which a face counts as a floor.
 FLOOR = 0.5
@@ -53,9 +53,8 @@ def no_light(context: CheckContext) -> Iterator[RawFinding]:
 def flat_light(context: CheckContext) -> Iterator[RawFinding]:
     """Spot and directional lights whose direction is undefined, because a node has a scale of zero.
 
-    The scale along the axis of the light is zero in the light's node or in a parent. The transformed
-    direction is then zero or consists of rounding errors. Point lights have no direction, so they are not
-    affected.
+    The light's node or a parent scales the axis of the light by practically zero. The transformed direction
+    is then zero or consists of rounding errors. Point lights have no direction, so they are not affected.
     """
     for warning in context.scene.warnings:
         if warning.code == "flat-light":
@@ -72,7 +71,7 @@ def light_range(context: CheckContext) -> Iterator[RawFinding]:
     """Lights whose `range` is smaller than the distance to the farthest corner of the scene.
 
     Light fades to zero at the range, as KHR_lights_punctual specifies. Engines may use another falloff or
-    ignore the range.
+    ignore the range. One finding counts all such lights and describes the light with the smallest range.
     """
     lights = [
         light for light in context.scene.lights if math.isfinite(light.range) and max(light.intensity) > 0
@@ -103,8 +102,9 @@ def light_range(context: CheckContext) -> Iterator[RawFinding]:
 def light_inside(context: CheckContext) -> Iterator[RawFinding]:
     """A light inside a closed solid, such as a light inside the mesh of its bulb.
 
-    Every surface blocks light from both sides, so no light leaves the solid. Two cases are not reported:
-    rooms, whose fronts point inwards, and parts with a material that may let light pass (MASK, BLEND).
+    Every surface blocks light from both sides, so no light leaves the solid. Closed parts whose fronts point
+    inwards are rooms, and are not reported. Parts with a material that may let light pass (MASK, BLEND) are
+    not reported either.
     """
     solids = None
     for light in context.scene.lights:
@@ -120,9 +120,9 @@ def light_inside(context: CheckContext) -> Iterator[RawFinding]:
 
 
 def _solids(context: CheckContext) -> Iterator[tuple[str, NDArray[np.float64]]]:
-    """Yield the instance name and the face corners (n, 3, 3), metres, world, of opaque closed parts.
+    """Yield the instance name and the face corners (n, 3, 3), metres, world, of each opaque closed part.
 
-    Instances whose bounding box contains no light are left out.
+    Parts whose fronts point inwards, and instances whose bounding box contains no light, are left out.
     """
     materials = context.scene.materials
     opaque = np.array([material.alpha_mode == "OPAQUE" for material in materials], bool)
@@ -150,13 +150,13 @@ def _solids(context: CheckContext) -> Iterator[tuple[str, NDArray[np.float64]]]:
     fix="set the intensity in cd (lights with a position), lx (parallel light) or cd/m2 (emission)",
 )
 def light_intensity(context: CheckContext) -> Iterator[RawFinding]:
-    """Lights with a negative or zero intensity, or an implausibly high one.
+    """Lights with a negative, zero or implausibly high intensity, and surfaces with implausible emission.
 
-    A negative intensity is an error, because a bake refuses it. The limits are 1e6 cd for point lights, 1e7
-    cd for spot lights, 2e5 lx for directional lights (the sun gives 1.2e5 lx) and 1e8 cd/m2 for surfaces.
-    Higher numbers are often watts or lumens that were exported as candela. Some exporters convert watts with
-    683 lm/W. Blender does so in the lighting mode Standard, and exports the numbers unchanged in the mode
-    Unitless.
+    A negative intensity is an error, because a bake refuses it. The highest plausible numbers are 1e6 cd for
+    point lights, 1e7 cd for spot lights, 2e5 lx for directional lights (the sun gives 1.2e5 lx) and 1e8 cd/m2
+    for surfaces. Higher numbers are often watts or lumens that were exported as candela. Some exporters
+    multiply watts by 683 lm/W. Blender does so in the lighting mode Standard, and exports the numbers
+    unchanged in the mode Unitless.
     """
     for light in context.scene.lights:
         location = Location(light.name, light.node)
@@ -189,10 +189,9 @@ def albedo(context: CheckContext) -> Iterator[RawFinding]:
     """Materials that reflect more than 95 % of the light.
 
     No natural material reflects as much. Light decays very slowly between such surfaces, and closed rooms
-    with such surfaces become arbitrarily bright. A glTF material without a base colour is white: its albedo
-    is 1. If an albedo exceeds 0.98, paths of 20 reflections measure the factor by which all reflections
-    together multiply the light.
-    This factor is reported if it exceeds 20. A bake reports it as well.
+    with such surfaces become extremely bright. A glTF material without a base colour is white: its albedo is
+    1. If an albedo exceeds 0.98, paths of 20 reflections measure the factor by which all reflections together
+    multiply the light. This factor is reported if it exceeds 20. A bake warns of it as well.
     """
     gain = None
     reflected = albedos(context)
@@ -214,8 +213,9 @@ def albedo(context: CheckContext) -> Iterator[RawFinding]:
 def albedos(context: CheckContext) -> NDArray[np.float64]:
     """Return the albedo of each material, (M,) float64: its largest colour component, 0 if it is not used.
 
-    It is an upper bound: base colour factor times brightest vertex colour. If this exceeds `MOST_REFLECTED`
-    and the material has a base colour texture, it is multiplied by the mean texture colour.
+    The albedo is estimated as base colour factor times brightest vertex colour component. If this product
+    exceeds `MOST_REFLECTED` and the material has a texture, the factor is multiplied by the mean texture
+    colour.
     """
     out = np.zeros(len(context.scene.materials))
     brightest = _brightest_vertex_colours(context)
@@ -230,9 +230,9 @@ def albedos(context: CheckContext) -> NDArray[np.float64]:
 
 
 def _brightest_vertex_colours(context: CheckContext) -> dict[int, float]:
-    """Return the largest vertex colour component on surfaces of each material, by material index.
+    """Return, by material index, the largest vertex colour component of primitives with this material.
 
-    It is 1 for a material with a primitive without vertex colours.
+    It is 1 for a material with a primitive without vertex colours. Primitives without good faces are ignored.
     """
     brightest: dict[int, float] = {}
     uncoloured: set[int] = set()
@@ -264,9 +264,10 @@ def image_mean(image: NDArray[np.generic]) -> NDArray[np.float64]:
     fix="paint the emissive texture, or give the material an emissiveFactor",
 )
 def emissive_black(context: CheckContext) -> Iterator[RawFinding]:
-    """Emissive materials that emit nothing.
+    """Materials with an emissive texture that emit nothing.
 
-    The emissive texture is black on all surfaces that use the material, or the emissive factor is zero.
+    The emissive texture is black on all surfaces that use the material, or the texture is not black but the
+    emissive factor is zero.
     """
     for k in context.used_materials:
         material = context.scene.materials[k]
@@ -291,7 +292,10 @@ def emissive_black(context: CheckContext) -> Iterator[RawFinding]:
     fix="turn the light: it shines along its node's -Z",
 )
 def sun_below(context: CheckContext) -> Iterator[RawFinding]:
-    """A directional light that comes from below every floor of the scene."""
+    """A directional light that shines on the front of no floor.
+
+    Floors are faces whose normal has a y component above 0.5. Scenes without floors are not tested.
+    """
     for light in context.scene.lights:
         if kind_of(light).has_position or not max(light.intensity) > 0:
             continue

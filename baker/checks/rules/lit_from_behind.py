@@ -1,4 +1,4 @@
-"""Reports open surfaces whose back receives the light."""
+"""Reports open one-sided surfaces whose back receives nearly all of the light."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from baker.checks.rule import check
 from baker.core.light_kind import kind_of
 from baker.core.readable import percent
 
-# Smallest number of sample points on a reported object, and the largest share of the light on its two sides
-# that its front gets.
+# An object is reported only if it has at least _FEWEST sample points, and if its front gets at most the share
+# _FRONT of the light that arrives at its front and its back together.
 _FEWEST, _FRONT = 8, 0.02
 
 
@@ -25,12 +25,14 @@ _FEWEST, _FRONT = 8, 0.02
     fix="flip its faces, or make its material double-sided, if it should show this light",
 )
 def lit_from_behind(context: CheckContext) -> Iterator[RawFinding]:
-    """A one-sided surface on whose front nearly none of the light arrives, and on whose back there is light.
+    """A one-sided object that gets at least 98 % of its direct light on its back.
 
-    The back of a one-sided surface is black, so the object is dark although a light is next to it. Usually
-    its faces are wound the wrong way. The direct light of lights with a position and of emitters is compared
-    on both sides, at up to 2048 points of the scene. Closed meshes, sunlight and sky are left out: walls of a
-    room have their back to the sun. `inside-out` finds closed meshes that are inverted.
+    The back of a one-sided surface is black, so the object is dark although light arrives at it. Usually its
+    faces are wound the wrong way. The direct light of emitters and of lights with a position is compared on
+    both sides, at 2048 random points of the scene. Parallel light and the sky are ignored, because they reach
+    the backs of the walls of every room from outside. Closed meshes are not reported here, but by the rule
+    `inside-out`. An object is reported if light arrives at the backs of more than half of its points, and
+    none of these points is on a double-sided face.
     """
     world = context.world
     some = any(kind_of(light).has_position for light in context.scene.local_lights)
@@ -48,7 +50,7 @@ def lit_from_behind(context: CheckContext) -> Iterator[RawFinding]:
         if back > 0 and front <= _FRONT * (front + back) and (found.back[mine] > 0).mean() > 0.5:
             x, y, z = world.middle_of(int(found.triangle[mine][0]))
             share = back / (front + back)
-            text = f"{percent(share)} of the light of nearby lights arrives at its black back"
+            text = f"{percent(share)} of the direct light that arrives at it hits its black back"
             yield RawFinding(
                 text,
                 Location(instance.name, instance.node),

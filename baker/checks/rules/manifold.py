@@ -15,16 +15,18 @@ from baker.checks.rule import check
 from baker.checks.rules.bad_faces import faces_found
 from baker.topology.weld import connected, number_by_first
 
-# A piece counts as closed except for holes if the holes' area is less than this share of the piece's area.
+# Total area of the holes of a piece, as a share of the piece's area, from which on the holes count as
+# intended.
 MOST_OPEN = 0.05
-# Largest number of holes of a mesh that are tested for being a missing bottom. A bottom is missing if the
-# normals of the faces beside it have a vertical component of at most `STEEP`, and if its edges lie above the
-# lowest vertex of the piece by at most the share `FLAT` of the height of the piece.
+# MOST_BOTTOMS: largest number of holes of a mesh that are tested for being a missing bottom.
+# STEEP: largest magnitude of the vertical component of the unit normals of the faces beside a missing bottom.
+# FLAT: largest height of the edges of a missing bottom above the lowest vertex of the piece, as a share of
+# the piece's height.
 MOST_BOTTOMS, STEEP, FLAT = 64, 0.5, 1e-3
 
 
 def _files(facts: MeshFacts, rows: NDArray[np.integer]) -> NDArray[np.int64]:
-    """Return the faces of the mesh, (n,) int64, for indices into `MeshFacts.sheet`; sorted, no duplicates."""
+    """Convert indices into `MeshFacts.sheet` to indices of faces in the mesh, (n,) int64, without repeats."""
     return facts.good[facts.sheet[np.unique(rows)]]
 
 
@@ -38,8 +40,8 @@ def non_manifold_edges(context: CheckContext) -> Iterator[RawFinding]:
     """Edges at which more than two faces meet.
 
     Inside and outside are not defined at such an edge. Typical causes are walls inside other walls and faces
-    left over from boolean operations. Pairs of faces with the same three positions are ignored, because they
-    are the two sides of a sheet.
+    left over from boolean operations. Faces with the same three positions as another face are not counted,
+    because they are the two sides of a sheet.
     """
     for m, facts in enumerate(context.meshes):
         edges = facts.edges
@@ -58,9 +60,9 @@ def non_manifold_edges(context: CheckContext) -> Iterator[RawFinding]:
     fix="move the touching parts apart, or into objects of their own",
 )
 def non_manifold_vertices(context: CheckContext) -> Iterator[RawFinding]:
-    """Vertices at which parts of a mesh touch only in a point.
+    """Vertices at which two groups of faces meet that share no edge at this vertex.
 
-    They do not affect light, but subdivision, simplification and some unwrappers fail at them.
+    Such vertices do not affect light, but subdivision, simplification and some unwrappers fail at them.
     """
     for m, facts in enumerate(context.meshes):
         edges, welded = facts.edges, facts.welded[facts.sheet]
@@ -85,9 +87,9 @@ def non_manifold_vertices(context: CheckContext) -> Iterator[RawFinding]:
 
 
 def _fans(facts: MeshFacts) -> NDArray[np.int64]:
-    """Return the fan of each corner of the sheet faces, (3S,) int64.
+    """Return the number of the fan of each corner of the S sheet faces, (3 S,) int64.
 
-    The faces at a vertex that are connected by edges at this vertex have the same fan number there.
+    A fan consists of the faces at a vertex that are connected by edges at this vertex.
     """
     edges = facts.edges
     one, two = edges.pairs(edges.count == 2)
@@ -112,10 +114,11 @@ def _fans(facts: MeshFacts) -> NDArray[np.int64]:
 def open_edges(context: CheckContext) -> Iterator[RawFinding]:
     """Open edges in a mesh that is closed except for small holes.
 
-    Light leaks through the holes. A part of the mesh is reported if the area of its holes is less than 5 % of
-    the area of its faces. Larger holes are assumed to be intended, as in a box without a lid or a sheet of
-    terrain. A missing bottom is intended, too, as at the feet of an arch that stands on the ground: its edges
-    are in the lowest horizontal plane of the part, and the faces beside it are steep.
+    Light leaks through the holes. The holes of a connected part of the mesh are reported if their total area
+    is less than 5 % of the area of the part's faces. Larger holes are assumed to be intended, as in a box
+    without a lid or a sheet of terrain. A missing bottom is assumed to be intended, too, as at the feet of an
+    arch that stands on the ground. The edges of a missing bottom are in the lowest horizontal plane of the
+    part, and the faces beside them are steep.
     """
     for m, facts in enumerate(context.meshes):
         edges = facts.edges
@@ -147,9 +150,10 @@ def open_edges(context: CheckContext) -> Iterator[RawFinding]:
 def _loops(
     low: NDArray[np.int64], high: NDArray[np.int64], piece: NDArray[np.int32]
 ) -> tuple[NDArray[np.int64], int]:
-    """Return the hole to which each of n open edges belongs, (n,) int64, and the number of holes.
+    """Return the number of the hole of each of n open edges, (n,) int64, and the number of holes.
 
-    `low` and `high` (n,) are the vertices of the edges, and `piece` (n,) are the pieces of their faces.
+    A hole is a set of open edges of one piece that are connected by vertices. `low` and `high` (n,) are the
+    vertices of the edges, and `piece` (n,) are the pieces of their faces.
     """
     n = int(max(low.max(), high.max())) + 1
     ends = np.concatenate([low, high]) + n * np.concatenate([piece, piece]).astype(np.int64)
@@ -165,8 +169,8 @@ def _hole_area(
 ) -> NDArray[np.float64]:
     """Return the area of each hole, (n_holes,) float64, in object space.
 
-    It is the length of the sum of the area vectors of the triangles between a border edge and the hole's
-    centroid. `border` (n,) are the open edges, and `hole` (n,) are their holes.
+    Each open edge and the centroid of its hole form a triangle. The area of a hole is the length of the sum
+    of the area vectors of its triangles. `border` (n,) are the open edges, and `hole` (n,) are their holes.
     """
     edges = facts.edges
     face, corner = edges.face[edges.first[border]], edges.corner[edges.first[border]]
@@ -187,7 +191,7 @@ def _missing_bottoms(
     area: NDArray[np.float64],
     up: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """Return (H,) bool: the holes that are a missing bottom, out of the `MOST_BOTTOMS` largest holes.
+    """Return (H,) bool: the holes that are a missing bottom. Only the largest `MOST_BOTTOMS` are tested.
 
     `border` (n,) are the open edges, `hole` (n,) are their holes, `area` (H,) are the holes' areas, and `up`
     (3,) is the gradient of the height in object space.
@@ -221,8 +225,8 @@ def _missing_bottoms(
 def flipped_neighbours(context: CheckContext) -> Iterator[RawFinding]:
     """Neighbouring faces that are wound in opposite directions.
 
-    One face shows its back where the other shows its front. The back of a one-sided surface is black: it
-    neither receives nor reflects light, and points near it count as inside geometry.
+    From any side, one of the two faces shows its front and the other its back. The back of a one-sided
+    surface is black: it neither reflects nor emits light.
     """
     for m, facts in enumerate(context.meshes):
         edges = facts.edges

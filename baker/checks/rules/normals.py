@@ -16,8 +16,8 @@ from baker.core.readable import number
 from baker.core.source_mesh import SourcePrimitive
 from baker.topology.unique_rows import unique_rows
 
-# Largest deviation of a normal's length from 1 that is accepted; rounding to normalized bytes causes this
-# much.
+# Largest deviation of a normal's length from 1 that is not reported. Rounding to normalized bytes changes
+# lengths by about this number.
 UNIT_SLACK = 0.02
 
 
@@ -50,9 +50,9 @@ def _length(normal: NDArray[np.float32]) -> NDArray[np.float64]:
     fix="export normals if the surface is meant to look smooth; it is baked with flat faces",
 )
 def missing_normals(context: CheckContext) -> Iterator[RawFinding]:
-    """Meshes without vertex normals.
+    """Meshes with primitives without vertex normals.
 
-    glTF requires flat normals for such meshes, so light changes abruptly at every edge.
+    glTF requires flat normals for such primitives, so light changes abruptly at every edge.
     """
     for m, facts in enumerate(context.meshes):
         lacking = [k for k, p in _parts(facts) if p.normal is None and len(p.triangle)]
@@ -114,7 +114,7 @@ def normals_against_faces(context: CheckContext) -> Iterator[RawFinding]:
     """Faces whose vertex normals all point to the back of the face.
 
     The winding defines the front, which is the side that receives light. The vertex normals define the
-    hemisphere from which light is gathered. Here this hemisphere is at the back, so the face is black.
+    hemisphere from which light is gathered. If this hemisphere is at the back, the face is black.
     """
     for m, facts in enumerate(context.meshes):
         for k, p in _parts(facts):

@@ -16,14 +16,16 @@ from baker.checks.rules.bad_faces import faces_found
 from baker.checks.world_triangles import cast
 from baker.core.parallel import thread_count
 
-# Share of an edge's length at each end that rays skip, because neighbouring faces touch the edge there.
+# Share of an edge's length that rays along the edge skip at both ends, because neighbouring faces touch the
+# edge there. The next search for a hit skips the same length behind each hit.
 _ENDS = 1e-4
-# Depth below which faces touch instead of intersecting, as a share of the mesh's diagonal.
+# Distance from a face, as a share of the mesh's diagonal. An edge pierces the face only if both its ends are
+# farther from the face's plane.
 _DEPTH = 1e-5
 # Largest number of hits that are tested along an edge.
 _ROUNDS = 4
-# Largest distance between two planes that count as the same, as a share of the scene's diagonal. The distance
-# is clamped between the following two limits, metres.
+# Tolerance of the distance between two planes that count as the same: COPLANAR times the scene's diagonal,
+# clamped to LEAST and MOST, metres.
 COPLANAR, LEAST, MOST = 1e-6, 1e-6, 1e-3
 # Components of plane normals are rounded to multiples of 1 / _TURN before they are compared.
 _TURN = 256.0
@@ -39,8 +41,8 @@ def self_intersection(context: CheckContext) -> Iterator[RawFinding]:
     """Faces of one mesh that intersect each other.
 
     Intersections are common where parts of a mesh overlap, and mostly harmless: texels inside the other part
-    are filled from their neighbours. Rays along all edges find the intersections. Parts that only touch are
-    not reported.
+    are filled from their neighbours. Rays along the edges find the intersections. At most four hits along
+    each edge are tested. Parts that only touch are not reported.
     """
     for m, facts in enumerate(context.meshes):
         pierced, n = _crossings(facts, thread_count(context.settings.threads))
@@ -99,10 +101,10 @@ def _pierces(
     other: NDArray[np.int64],
     depth: float,
 ) -> NDArray[np.bool_]:
-    """Return (n,) bool: the edges whose ends are on different sides of a plane, both farther than `depth`.
+    """Return (n,) bool: the edges whose ends lie on different sides of a face's plane.
 
-    The plane is that of the face `other`, (n,) indices into `MeshFacts.good`. `begin` and `end` are the ends
-    of the edges, (n, 3), object space.
+    Both ends must be farther than `depth` from the plane. `begin` and `end` are the ends of the edges,
+    (n, 3), object space. `other` (n,) are the faces, as indices into `MeshFacts.good`.
     """
     normal = facts.area_vector[other] / np.maximum(facts.area[other], 1e-300)[:, None]
     at = facts.corner[other, 0]
@@ -118,11 +120,12 @@ def _pierces(
     fix="move one surface by a millimetre, or cut the hidden part away",
 )
 def coplanar_overlap(context: CheckContext) -> Iterator[RawFinding]:
-    """Coplanar surfaces of different objects that overlap and have the same front (z-fighting).
+    """Coplanar surfaces of different objects that overlap and face the same direction (z-fighting).
 
     Engines show either surface at random, and each surface shadows the other at random. Two surfaces count as
-    coplanar if the distance between their planes is less than a millionth of the scene's diagonal. A box on a
-    floor is not reported, because the fronts of the two surfaces point in opposite directions.
+    coplanar if the distance between their planes is less than about a millionth of the scene's diagonal. A
+    box on a floor is not reported, because the fronts of the two surfaces point in opposite directions. There
+    is one finding for each pair of objects.
     """
     partner = _partners(context)
     world = context.world
@@ -169,8 +172,9 @@ def _partners(context: CheckContext) -> NDArray[np.int64]:
     away = np.einsum("tx,tx->t", world.normal, corner)
     turn = np.round(world.normal * _TURN).astype(np.int64) + int(_TURN)
     direction = (turn[:, 0] * 1024 + turn[:, 1]) * 1024 + turn[:, 2]
-    # Quantise plane offsets to two grids that are shifted by half a cell. Planes closer than half a cell
-    # share a cell in at least one grid. The shifts keep planes at round numbers away from cell borders.
+    # Quantise plane offsets to two grids of cells of twice the tolerance, shifted by half a cell. Planes
+    # closer than the tolerance share a cell in at least one grid. The shifts keep planes at round numbers
+    # away from cell borders.
     for shift in (0.3137, 0.8137):
         step = np.floor(away / (2.0 * tolerance) + shift).astype(np.int64)
         _match(context, direction, step, tolerance, partner)
@@ -186,8 +190,8 @@ def _match(
 ) -> None:
     """Find overlaps among triangles of equal `direction` and equal `step`, and write them to `partner`.
 
-    `direction` (T,) encodes the rounded normal of each triangle's plane, and `step` (T,) the grid cell of its
-    offset. `partner` (T,) is as `_partners` returns it.
+    `direction` (T,) encodes the rounded normal of each triangle's plane, and `step` (T,) the grid cell of the
+    plane's offset. Entries of `partner` (T,) are overwritten for triangles with an overlap.
     """
     from baker.checks.kernels.coplanar import coplanar_partners
 

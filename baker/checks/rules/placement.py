@@ -1,4 +1,4 @@
-"""Checks the scales of nodes, positions far from the origin and the size of the scene."""
+"""Checks the scales of nodes, the precision of positions, and the size of the scene."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from baker.checks.rules.cost import estimate_cost
 from baker.core.precision import coarse_objects
 from baker.core.readable import number
 
-# Smallest / largest singular value of the transform. Below this ratio a bake leaves an instance out.
+# Ratio of the smallest to the largest singular value of an instance's transform. Up to this ratio, a bake
+# leaves the instance out.
 FLATTEST = 1e-7
 # Smallest and largest plausible diagonal of a scene, metres. Outside of this range the unit is probably
 # wrong.
@@ -38,7 +39,7 @@ def _stretches(
     fix="give the node a scale other than zero, or delete it; a bake leaves it out",
 )
 def flat_instance(context: CheckContext) -> Iterator[RawFinding]:
-    """Nodes whose scale is zero along an axis, which flattens the object."""
+    """Nodes with a mesh whose scale is zero along an axis, which flattens the object."""
     for location, stretch, _, at in _stretches(context):
         if not stretch[2] > FLATTEST * stretch[0]:
             yield RawFinding("the node's scale is zero along an axis", location, position=at)
@@ -67,10 +68,10 @@ def negative_scale(context: CheckContext) -> Iterator[RawFinding]:
     fix="apply the scale to the mesh, so that texels stay square in engines that share its lightmap UVs",
 )
 def non_uniform_scale(context: CheckContext) -> Iterator[RawFinding]:
-    """Nodes whose scales along two axes differ by more than 1 %.
+    """Nodes whose largest scale exceeds their smallest scale by more than 1 %.
 
-    A lightmap uv that was made for the mesh is stretched in world space. The unwrapper of a bake measures
-    texel density in world space.
+    A lightmap uv that was made for the mesh is stretched in world space. The unwrapper of a bake avoids this
+    stretch, because it measures texel density in world space.
     """
     for location, stretch, _, at in _stretches(context):
         if stretch[2] > FLATTEST * stretch[0] and stretch[0] > 1.01 * stretch[2]:
@@ -89,11 +90,13 @@ def non_uniform_scale(context: CheckContext) -> Iterator[RawFinding]:
     fix="keep vertices near their own origin and far-apart places in scenes of their own",
 )
 def coarse_positions(context: CheckContext) -> Iterator[RawFinding]:
-    """Objects whose float32 vertex positions are spaced by more than a tenth of a texel.
+    """Objects whose float32 positions are spaced by more than a tenth of a texel.
 
     Files store vertices in single precision. 100 km from the origin of the mesh, neighbouring float32 numbers
     differ by 8 mm. Translations of nodes have no such rounding, so a level may be far from the world's origin
-    if its nodes place it there.
+    if its nodes place it there. But a bake traces float32 positions relative to a point near most of the
+    objects, so an object that is very far from the others is reported as well. A texel is assumed to have the
+    mean size of all texels.
     """
     scene, world = context.scene, context.world
     area = float(world.area.sum())

@@ -22,7 +22,7 @@ _UNWRAP = "unwrap the object (`fix` does, a bake with `uv='auto'` does so, too)"
 def laid_out(context: CheckContext, *, valid: bool = True) -> Iterator[tuple[int, UvFacts]]:
     """Yield index and lightmap uv of each mesh that has a lightmap uv.
 
-    With `valid`, meshes whose uv are not finite or outside the page are left out.
+    If `valid` is true, meshes with a uv that is not finite or outside the page are left out.
     """
     for m in range(len(context.meshes)):
         uv = context.uv(m)
@@ -83,8 +83,9 @@ def out_of_range(context: CheckContext) -> Iterator[RawFinding]:
 def overlap(context: CheckContext) -> Iterator[RawFinding]:
     """Faces of one object that overlap in the lightmap uv and therefore share texels.
 
-    Both faces show the light of one of the faces. The percentage is the share of texels that overlap at the
-    given resolution. Up to 0.1 % is accepted as rounding. The first ten pairs of faces are listed.
+    Both faces show the light of one of the faces. Overlaps are searched on a grid of twice the resolution of
+    the page, at most 8192 x 8192 points. The percentage is the share of overlapping points. Up to 0.1 % is
+    accepted as rounding. Ten pairs of faces are listed.
     """
     from baker.checks.kernels.uv_pairs import COVERED, COVERED_AGAIN, LISTED, OVERLAPPING, cover_pairs
 
@@ -106,10 +107,10 @@ def overlap(context: CheckContext) -> Iterator[RawFinding]:
 
 @check("uv.degenerate", group="uv", severity="warning", fix=_UNWRAP)
 def degenerate(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces without area in the lightmap uv, which have no texels.
+    """Faces without area in the lightmap uv.
 
-    The finding is an error if they make up more than 1 % of the object's surface, or if the whole layout is
-    smaller than one texel.
+    Such faces have no texels. The finding is an error if they make up more than 1 % of the object's surface,
+    or if the area of the whole layout is at most one texel.
     """
     resolution = context.settings.resolution
     for m, uv in laid_out(context):
@@ -126,7 +127,10 @@ def degenerate(context: CheckContext) -> Iterator[RawFinding]:
 
 @check("uv.flipped", group="uv", severity="warning", fix=_UNWRAP)
 def flipped(context: CheckContext) -> Iterator[RawFinding]:
-    """Faces whose orientation in uv differs from most of their chart, because the chart is folded there."""
+    """Faces whose orientation in uv differs from that of most of their chart.
+
+    The chart is folded at these faces.
+    """
     for m, uv in laid_out(context):
         sign = np.sign(uv.signed_area)
         major = np.sign(uv.per_chart(uv.signed_area))
@@ -149,7 +153,8 @@ def mirrored(context: CheckContext) -> Iterator[RawFinding]:
     """
     for m, uv in laid_out(context):
         area = uv.per_chart(uv.signed_area)
-        # Exporters differ in the direction of v, so take the orientation of the larger area as not mirrored.
+        # Exporters differ in the direction of v, so the orientation of the larger area counts as not
+        # mirrored.
         usual = np.sign(area.sum()) or 1.0
         odd = np.flatnonzero(area * usual < 0)
         if len(odd):

@@ -13,11 +13,11 @@ from baker.checks.rule import check
 from baker.checks.rules.uv_layout import laid_out
 from baker.core.readable import number
 
-# Smallest number of different values for which the rounding of a uv set is determined.
+# Smallest number of different uv values from which rounding is recognised.
 _FEWEST_VALUES = 16
 # Numbers of bits that are tried, and the largest distance of a value from a level, in levels.
 _BITS, _SLACK = range(6, 15), 0.02
-# Spacing of half floats from 0.5 to 1.
+# Spacing of half floats between 0.5 and 1.
 _HALF_SPACING = 2.0**-11
 
 
@@ -31,8 +31,8 @@ def uv_precision(context: CheckContext) -> Iterator[RawFinding]:
     """A lightmap uv whose numbers are rounded more coarsely than the size of a texel.
 
     Compression rounds uv to few bits: Draco and gltfpack to 12 bits by default, half floats to 11. Charts
-    then shift against the light by up to half a step, and seams become visible. Rounding to evenly spaced
-    levels over 0..1 or over the range of the layout is found, and rounding to half floats.
+    then shift against the light by up to half a step, and seams become visible. The rule recognises half
+    floats, and 6 to 14 bits over 0..1 or over the range of the layout.
     """
     size = context.settings.resolution
     for m, uv in laid_out(context):
@@ -45,7 +45,7 @@ def uv_precision(context: CheckContext) -> Iterator[RawFinding]:
 
 
 def _rounding(uv: NDArray[np.float64]) -> tuple[float, str] | None:
-    """Return the largest step of rounded uv (n, 2) and a description, or None if they are not rounded."""
+    """Return the largest step of rounded uv (n, 2) and a description, or None if no rounding is found."""
     values = np.unique(uv)
     if len(values) < _FEWEST_VALUES:
         return None
@@ -68,7 +68,7 @@ def _rounding(uv: NDArray[np.float64]) -> tuple[float, str] | None:
 
 
 def _is_half(values: NDArray[np.float64]) -> bool:
-    """Return whether values are half floats, with steps finer than those from 0.5 to 1 as evidence."""
+    """Return whether all values are half floats, and some are not multiples of `_HALF_SPACING`."""
     if not (values == values.astype(np.float16)).all():
         return False
     # If all values are multiples of `_HALF_SPACING`, they may be a regular grid instead of half floats.

@@ -1,4 +1,4 @@
-"""Reports objects whose lightmap uv overlap each other on one page."""
+"""Reports meshes whose lightmap uv overlap each other on one page."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from baker.checks.rule import check
 from baker.checks.rules.uv_layout import laid_out
 from baker.uv.check import EDGE_SLACK, PAGE_TOLERANCE
 
-# Rows and columns of the grid on which overlaps are searched.
+# Number of rows and columns of the grid on which overlaps are searched.
 _SIDE = 512
 
 
@@ -26,9 +26,9 @@ def shared(context: CheckContext) -> Iterator[RawFinding]:
     """Objects whose TEXCOORD_1 overlaps that of another object.
 
     The lightmap uv of each object is valid alone, but together they do not fit on one page. An example is
-    a kit in which the uv of each object fills 0..1. A bake then packs the objects as rectangles, and
-    `uv_scale` and `uv_offset` of `bake.json` describe where. Overlaps are searched on a grid of 512 x 512
-    points.
+    a kit in which the uv of each object fills 0..1. A bake then packs the layouts of the objects as
+    rectangles, and writes their positions to `bake.json` as `uv_scale` and `uv_offset`. Overlaps are searched
+    on a grid of 512 x 512 points. Instances of the same mesh are not compared.
     """
     from baker.checks.kernels.uv_pairs import cover_pairs
 

@@ -21,13 +21,13 @@ SMALLEST_CHART = 4.0
 # A chart is reported if its texels per metre differ from the object's median by more than this factor. A
 # factor of 4 is two mip levels.
 DENSITY_FACTOR = 4.0
-# Ratio of singular values above which a face counts as stretched, and the share of an object's surface above
-# which stretched faces are reported.
+# Ratio of singular values above which a face counts as stretched, and share of an object's surface above
+# which the stretched faces are reported.
 STRETCH, MOST_STRETCHED = 4.0, 0.05
 # Area of a layout as a share of its bounding rectangle. Below this share, the layout is reported.
 LEAST_FILLED = 0.4
-# Share of an object's surface that has no area in TEXCOORD_0. Above this share, TEXCOORD_0 counts as a lookup
-# of palette colours.
+# Share of an object's surface whose faces are points in TEXCOORD_0, above which TEXCOORD_0 may be a lookup of
+# palette colours.
 PALETTE_SHARE = 0.9
 
 
@@ -62,8 +62,8 @@ def tiny_chart(context: CheckContext) -> Iterator[RawFinding]:
 def padding(context: CheckContext) -> Iterator[RawFinding]:
     """Charts so close to each other that bilinear lookup mixes them.
 
-    A lookup at the border of a chart also reads the next texel. If this texel is part of another chart, its
-    light appears as a bright or dark line.
+    A lookup at the border of a chart also reads the neighbouring texels. If one of them is part of another
+    chart, its light appears as a bright or dark line.
     """
     for m, uv in laid_out(context):
         close, covered = _close(uv, context.settings.resolution)
@@ -87,7 +87,7 @@ def padding_mip(context: CheckContext) -> Iterator[RawFinding]:
     """Charts that bilinear lookup mixes at the mip level `mip` (default 2).
 
     A texel of level n covers 2^n x 2^n texels of the page. Only lightmaps that are sampled with mipmaps are
-    affected.
+    affected. Objects that `uv.padding` reports are not reported again.
     """
     coarse = context.settings.resolution >> context.mip
     for m, uv in laid_out(context):
@@ -125,7 +125,8 @@ def _close(uv: UvFacts, resolution: int) -> tuple[int, int]:
 def density(context: CheckContext) -> Iterator[RawFinding]:
     """Charts whose texels per metre differ from the object's median by a factor of more than four.
 
-    At the border between such a chart and another one, a shadow changes from sharp to blurred.
+    The median is weighted by area. At the border between such a chart and another chart, a shadow changes
+    from sharp to blurred.
     """
     for m, uv in laid_out(context):
         flat, real = uv.per_chart(np.abs(uv.signed_area)), uv.per_chart(uv.area)
@@ -162,8 +163,8 @@ def _weighted_median(value: NDArray[np.float64], weight: NDArray[np.float64]) ->
 def stretch(context: CheckContext) -> Iterator[RawFinding]:
     """A lightmap uv in which more than 5 % of the surface has a stretch above four.
 
-    Stretch is the ratio of the singular values of the map from surface to uv. Texels on stretched faces are
-    strips: shadows look blurred along the strips and sharp across them.
+    Stretch is the ratio of the larger to the smaller singular value of the map from surface to uv. Texels on
+    stretched faces are strips: shadows look blurred along the strips and sharp across them.
     """
     for m, uv in laid_out(context):
         ratio = _anisotropy(uv)
@@ -178,10 +179,7 @@ def stretch(context: CheckContext) -> Iterator[RawFinding]:
 
 
 def _anisotropy(uv: UvFacts) -> NDArray[np.float64]:
-    """Return the stretch of each face, (F,) float64: the ratio of singular values of the map to uv.
-
-    It is 1 for faces without uv area.
-    """
+    """Return the stretch of each face, (F,) float64, see `stretch`; 1 for faces without uv area."""
     corner = uv.facts.corner[uv.rows]
     e1, e2 = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     length = np.maximum(np.sqrt(np.einsum("fx,fx->f", e1, e1)), 1e-300)
@@ -232,8 +230,9 @@ def utilisation(context: CheckContext) -> Iterator[RawFinding]:
 def palette(context: CheckContext) -> Iterator[RawFinding]:
     """Objects whose TEXCOORD_0 only looks up the colours of a palette.
 
-    Nearly all faces are single points in this uv set, so it cannot be used as a lightmap uv. Some engines use
-    TEXCOORD_0 for the lightmap if TEXCOORD_1 is missing.
+    Faces with more than 90 % of the surface are single points in this uv set, so it cannot be used as a
+    lightmap uv. Some engines use TEXCOORD_0 for the lightmap if TEXCOORD_1 is missing. An object is reported
+    if it has at least twice as many faces as different colours.
     """
     for m, facts in enumerate(context.meshes):
         uv = UvFacts(facts, 0)

@@ -10,8 +10,8 @@ from baker.checks.context import CheckContext
 from baker.checks.finding import RawFinding
 from baker.checks.rule import check
 
-# Vertex colour component below which a vertex counts as black, and base colour component below which a
-# material counts as black itself.
+# BLACK: vertex colours count as black if all components of all vertices are below this number.
+# COLOURED: a material counts as black if all components of its base colour factor are below this number.
 BLACK, COLOURED = 0.01, 0.05
 
 
@@ -22,10 +22,11 @@ BLACK, COLOURED = 0.01, 0.05
     fix="take COLOR_0 off the mesh, or paint it white where the material is to be seen as it is",
 )
 def black_colours(context: CheckContext) -> Iterator[RawFinding]:
-    """A mesh whose vertex colours are all black although its material is not.
+    """A primitive whose vertex colours are all black although its material is not.
 
-    glTF multiplies the base colour by COLOR_0, so such a surface reflects nothing. Usually the vertex colours
-    were never painted, or contain data for the shader of an engine, such as wind or wetness.
+    The base colour is multiplied by the vertex colour (COLOR_0 in glTF), so such a surface reflects less than
+    1 % of the light. Usually the vertex colours were never painted, or contain data for the shader of an
+    engine, such as wind or wetness. Only vertices that faces use are tested.
     """
     for m, facts in enumerate(context.meshes):
         for k, primitive in enumerate(facts.source.primitives):
