@@ -17,7 +17,7 @@ from baker.cli.supervise import supervise
 
 
 def main() -> None:
-    """Run the command line of this process. This function does not return; it ends the process."""
+    """Run the command line of this process, and end the process with the exit code."""
     argv = sys.argv[1:]
     # Collect garbage less often, because imports create many objects but no cycles. Collections took 5 % of
     # the start-up time.
@@ -52,9 +52,9 @@ def run(argv: list[str], *, out: TextIO | None = None, stop: Any = None, notes: 
     argv : list of str
         Arguments, without the name of the program.
     out : TextIO or None
-        Stream for standard output. None: `sys.stdout`.
+        Stream to which the command writes its output; `sys.stdout` if None.
     stop : StopFlag or None
-        Flag that is set by stopping signals. None: signals are not handled.
+        Flag that is set by stopping signals; None if signals are not handled.
     notes : int or None
         Descriptor of the file for `note_output`, see `supervise`.
     """
@@ -69,13 +69,14 @@ def run(argv: list[str], *, out: TextIO | None = None, stop: Any = None, notes: 
         out.flush()
         return code
     except (SystemExit, BrokenPipeError):
-        # The reader of the pipe, such as `head`, has closed it. typer may convert this error to an exit.
+        # The program that reads the output, such as `head`, has closed the pipe. typer may convert the
+        # BrokenPipeError to SystemExit.
         _silence(out)
         return 0
     except (Exception, KeyboardInterrupt) as error:
         from baker.cli.failures import report
 
-        # An import that is interrupted may fail with any error.
+        # A signal that interrupts an import may cause any error.
         interrupted = stop is not None and stop.requested
         cause = KeyboardInterrupt() if interrupted else error
         return report(cause, as_json=_asks_json(argv), traceback=_verbosity(argv) >= 2, out=out)
@@ -92,7 +93,8 @@ def _dispatch(argv: list[str], session: Any) -> int:
 
 
 def _without_interrupts(unraisable: Any) -> None:
-    # An interrupt inside a callback of the interpreter is printed and lost; the flag still stops the work.
+    # Python prints a KeyboardInterrupt that is raised in a callback of the interpreter and continues. Do not
+    # print it. The work stops anyway, because the signal also set the flag.
     if not issubclass(unraisable.exc_type, KeyboardInterrupt):
         sys.__unraisablehook__(unraisable)
 

@@ -39,7 +39,7 @@ def bake_command(
     settings = run.of(BakeSettings)
     run.session.will_write(str(out))
     with run.progress() as progress:
-        # Import these modules after progress is shown, because importing the kernels takes a moment.
+        # Import these modules after progress is shown, because importing the kernels is slow.
         from baker.trace.numba_start import skip_blas
 
         skip_blas()
@@ -48,8 +48,8 @@ def bake_command(
         from baker.pipeline.bake import bake
 
         progress.follow(BakePlan(stage_seconds(settings, scene)))
-        # Exclude the objects that exist now from garbage collection. It took 4 % of the time of a first bake,
-        # which compiles kernels.
+        # Exclude the objects that exist now from garbage collection. Collections took 4 % of the time of a
+        # first bake, which compiles kernels.
         gc.freeze()
         spread: dict[str, Any] = (
             {} if cluster is None else {"executor": _tile_executor(cluster, settings.threads)}

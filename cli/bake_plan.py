@@ -5,14 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 
-# Weight of the expected speed against the measured one, seconds of expected work.
+# Weight of the assumption that work takes the expected time, seconds of expected work. The weight of the
+# measurement is the expected seconds of the finished stages.
 _PRIOR_SECONDS = 2.0
-# Smallest completed share of a stage at which its duration is extrapolated from its own progress.
+# Share of a stage that must be done before the stage's duration is extrapolated from its progress.
 _ENOUGH = 0.1
 
 
 class BakePlan:
-    """Expected seconds of the stages of a bake, corrected by the seconds that its stages take.
+    """Estimates the progress of a bake from expected seconds of its stages and from measured seconds.
 
     Parameters
     ----------
@@ -37,7 +38,7 @@ class BakePlan:
         self._left: tuple[float, float] | None = None
 
     def update(self, stage: str, fraction: float, *, compiling: bool = False) -> tuple[float, float | None]:
-        """Take the report of a stage.
+        """Return the progress of the bake after a report of a stage.
 
         Parameters
         ----------
@@ -54,7 +55,7 @@ class BakePlan:
         share : float
             Share of the bake that is done, 0 to 1. It never falls.
         left : float or None
-            Seconds until the end; None while kernels are compiled.
+            Seconds until the end; None while kernels are compiled, or if there is no estimate yet.
         """
         now = self._clock()
         if stage in self._expected and stage != self._stage:
@@ -77,17 +78,17 @@ class BakePlan:
         return self._share, left
 
     def _finish_stage(self) -> None:
-        """Add the stage that ends to the measured work, unless kernels were compiled in it."""
+        """Add the last stage to the sums of finished stages, unless kernels were compiled in it."""
         if self._stage and not self._compiled:
             self._planned += self._expected[self._stage]
             self._measured += self._clock() - self._started
 
     def _slowness(self) -> float:
-        """Return measured seconds for each expected second."""
+        """Return the estimated ratio of the real duration of work to its expected duration."""
         return (_PRIOR_SECONDS + self._measured) / (_PRIOR_SECONDS + self._planned)
 
     def _left_of_stage(self, fraction: float) -> float:
-        """Return the seconds that the running stage still needs."""
+        """Return the estimated seconds until the end of the running stage."""
         if fraction >= _ENOUGH and not self._compiled:
             return (self._clock() - self._started) * (1 - fraction) / fraction
         return self._expected[self._stage] * (1 - fraction) * self._slowness()

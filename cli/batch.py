@@ -25,7 +25,7 @@ def batch(
     junit: Annotated[Path | None, typer.Option("--junit", metavar="FILE", help="Write JUnit XML.")] = None,
     cluster: Cluster = None,
 ) -> None:
-    """Bake the jobs that are not up to date, show the progress of all jobs together, and report."""
+    """Bake the jobs that are not up to date, show progress, and print the results."""
     from baker.jobs.report import run_jobs_file
     from baker.jobs.run import write_junit
 

@@ -1,4 +1,4 @@
-"""Defines the decorator of subcommands, which adds flags for settings and runs the steps that they share."""
+"""Defines the decorator of subcommands, which adds flags for settings and combines settings from sources."""
 
 from __future__ import annotations
 
@@ -52,12 +52,12 @@ class Run:
     settings: dict[type[Settings], Settings]
 
     def of(self, model: type[_S]) -> _S:
-        """Return the settings of one model."""
+        """Return the settings of the class `model`."""
         return cast("_S", self.settings[model])
 
     @contextmanager
     def progress(self) -> Iterator[Reporter]:
-        """Show progress. It begins with the stage "start", because importing the kernels takes a moment."""
+        """Show progress during the `with` statement, first the stage "start", because imports are slow."""
         with self.session.reporter(quiet=self.quiet) as reporter:
             reporter(Stage.START, 0.0)
             yield reporter
@@ -130,9 +130,9 @@ def command(
     name : str
         Name of the subcommand, as in `commands.COMMANDS`.
     *models : type of Settings
-        Models whose fields become flags. If two models have a field with the same name, the flag is made from
-        the field of the first model. If a configuration file can contain settings of a model, the flag
-        `--config` is added.
+        Classes whose fields become flags. If two classes have a field with the same name, the flag is made
+        from the field of the first class. If a configuration file can contain settings of one of the classes,
+        the flag `--config` is added.
     fixed : dict, optional
         Settings with a fixed value. They have no flag.
     common : str
@@ -174,7 +174,7 @@ class _SettingsCommand(TyperCommand):
     _help_all = False
 
     def add_settings(self, models: tuple[type[Settings], ...], fixed: dict[str, Any]) -> None:
-        """Append the flags of `models`, except the settings `fixed`, and the flags of every subcommand."""
+        """Append flags for the fields of `models` that are not in `fixed`, and flags of all subcommands."""
         self.models, self.fixed = models, fixed
         fields = {
             name: field
@@ -195,7 +195,7 @@ class _SettingsCommand(TyperCommand):
         self.flag_names = [name for name, _, _ in flags]
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the arguments; an empty one for a path is refused, since `Path("")` is the current folder."""
+        """Parse the arguments, and refuse empty paths, because `Path("")` is the current folder."""
         if "--help-all" in args:
             self._help_all, args = True, ["--help"]
         paths = {

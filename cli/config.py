@@ -1,4 +1,4 @@
-"""Combines settings from defaults, a TOML file and the command line, each overriding the one before."""
+"""Combines settings: a TOML file overrides defaults, and the command line overrides the file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from baker.io.toml_file import read_toml
 TOP_TABLE = "bake"
 # Names of all tables that a configuration file may have.
 TABLES = ("bake", "check", "verify", "render", "diff", "repair")
-# Settings that are lists. Values from the command line are added to the values of the file.
+# Lists whose values on the command line are added to the values in the file instead of replacing them.
 _ADDED = {"ignore"}
 
 
@@ -27,15 +27,15 @@ def read_config(path: Path, name: str = TOP_TABLE) -> dict[str, Any]:
     Parameters
     ----------
     path : Path
-        TOML file with a table for each kind of settings. The settings of a bake may be at the top level
-        instead of in the table `[bake]`.
+        TOML file with tables of settings. The settings of a bake may be at the top level instead of in the
+        table `[bake]`.
     name : str
         Name of the table.
 
     Returns
     -------
     dict
-        The values by key, not validated.
+        The values by key, which are not validated yet.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def resolve(
     Raises
     ------
     SettingsError
-        If a key is unknown or a value out of range. The error names the file if the value is from a file.
+        If a setting is unknown or a value is invalid. The error names the file if the value is from a file.
     """
     found: dict[type[Settings], Settings] = {}
     shared: dict[str, Any] = {}

@@ -17,11 +17,11 @@ from baker.metrics.figures import FIGURES, figure_text
 if TYPE_CHECKING:
     from baker.comparison.compare import DiffReport
 
-# Number of objects, and of texels, that are shown without --verbose.
+# Largest number of objects, and of texels, that are shown without --verbose.
 _SHOWN = 3
 # Metrics in the columns of the table.
 _COLUMNS = ("texels", "bias", "colour_bias", "median", "p95", "colour_p95", "max", "nrmse", "flip")
-# Ratio of colour_p95 to p95 from which the last line mentions colours.
+# Ratio of colour_p95 to p95 above which the last line mentions colours.
 _COLOUR = 1.5
 
 
@@ -72,7 +72,7 @@ def write_text(found: DiffReport, stream: TextIO, *, verbose: int) -> None:
 
 
 def _sentence(found: DiffReport) -> str:
-    """Return one sentence about how far A is from B."""
+    """Return one sentence about the differences between A and B."""
     parts = []
     for name, check in found.channels.items():
         metrics = check.metrics
@@ -90,9 +90,9 @@ def _sentence(found: DiffReport) -> str:
 
 
 def _furthest(found: DiffReport) -> list[tuple[float, str, dict[str, Any]]]:
-    """Return (error, channel, object) for each object with an error, the largest error first.
+    """Return (error, channel, object) for each channel of each object, the largest error first.
 
-    The error is the larger of p95 and colour_p95.
+    The error is the larger of p95 and colour_p95. Channels of objects without errors are left out.
     """
     apart = [
         (max(float(figures["p95"]), float(figures["colour_p95"])), name, entry)
@@ -104,7 +104,7 @@ def _furthest(found: DiffReport) -> list[tuple[float, str, dict[str, Any]]]:
 
 
 def _difference(entry: dict[str, Any], verbose: int) -> str:
-    """Return what differs in an entry of the manifests: for lights, each property in full."""
+    """Return the two values of an entry that differs; for lights, each property that differs."""
     a, b = entry["a"], entry["b"]
     if not entry["what"].startswith("lights."):
         return f"{_brief(a, verbose)} | {_brief(b, verbose)}"
@@ -122,7 +122,7 @@ def _properties(light: Any) -> str:
 
 
 def _value(a: Any, b: Any) -> str:
-    """Return two values with six digits, or with all digits if the first six are equal."""
+    """Return two values with six significant digits, or with all digits if the first six are equal."""
     texts = _rounded(a), _rounded(b)
     if texts[0] == texts[1]:
         texts = json.dumps(a), json.dumps(b)

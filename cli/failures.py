@@ -12,12 +12,12 @@ from baker.cli.foreign_flags import answer_error
 from baker.core import error_mapping as failure
 from baker.core.errors import BakerError, SettingsError
 
-# Exit code of a check or comparison that failed.
+# Exit code of `check`, `verify` and `diff` if the result failed.
 FAILED_CHECK = 1
 
 
 def explain(error: BaseException) -> BakerError | None:
-    """Convert an exception to a `BakerError`. Return None if it can only be caused by a bug.
+    """Convert an exception to a `BakerError`, also an error of the parser. Return None for other exceptions.
 
     Parameters
     ----------

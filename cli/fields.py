@@ -25,7 +25,7 @@ def range_of(field: Any) -> str:
 
 
 def default_of(field: Any) -> str:
-    """Return the default of a setting as typed on the command line; empty for None and an empty list."""
+    """Return the default of a setting as text, "on" or "off" for switches; empty for None and empty lists."""
     value = field.default
     if value is None:
         return ""
@@ -47,7 +47,7 @@ def group_of(field: Any) -> str:
 
 
 def kinds_of(field: Any) -> list[Any]:
-    """Return the types that the value of a setting may have, without None; for a Literal, its choices."""
+    """Return the types that the value of a setting may have, without None; for a Literal, the choices."""
     kinds: list[Any] = []
     stack = [field.annotation]
     while stack:
@@ -72,7 +72,7 @@ def choices_of(field: Any) -> list[str]:
 
 
 def metavar_of(field: Any) -> str:
-    """Return the placeholder for the value of a setting in the help: `N`, `NUMBER`, `a|b` or `TEXT`."""
+    """Return the placeholder for the value of a setting in the help, such as `N`, `a|b` or `TEXT`."""
     metavar = _extra(field, "metavar")
     if metavar:
         return str(metavar)
@@ -101,7 +101,7 @@ def flag_of(name: str, field: Any) -> str:
 
 
 def help_of(field: Any) -> str:
-    """Return the help of a setting's flag: meaning, range, default."""
+    """Return the help of a setting's flag: its description, with range and default in brackets."""
     from baker.cli.flags import in_flags
 
     shown = "" if is_switch(field) and not field.default else default_of(field)

@@ -39,7 +39,7 @@ def fix_request(
     Raises
     ------
     SettingsError
-        If the flags are contradictory or `out` cannot be written.
+        If the flags contradict each other, or `out` is missing or must not be written.
     """
     if not (fix or settings.repair):
         if out is not None:

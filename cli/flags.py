@@ -1,6 +1,6 @@
 """Converts names of settings in messages of the library to flags of the command line.
 
-In messages of the library, a setting or an argument is between backticks, and a value has the form of Python:
+In messages of the library, settings and arguments are between backticks and have the form of Python code:
 "raise `resolution`", "pass `denoise=False`", "use `dtype='float'`".
 """
 
@@ -19,7 +19,7 @@ _ARGUMENTS = frozenset({
 })  # fmt: skip
 # Arguments whose flag is not `--` followed by their name.
 _SHORT = {"out": "-o"}
-# This argument has the same name as an export, so it is converted only if it has a value.
+# Argument that is converted only if it has a value, because an export has the same name.
 _AMBIGUOUS = "three"
 
 

@@ -1,4 +1,4 @@
-"""Answers flags of other bakers, see `baker.core.foreign_names`."""
+"""Builds the message about an unknown flag that other programs have, see `baker.core.foreign_names`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from baker.core.foreign_names import foreign_answer
 
 
 def answer(option: str, known: set[str], command: str) -> str | None:
-    """Return a sentence about an unknown flag that other bakers have.
+    """Return a sentence that recommends a flag or a section of LIMITS.md instead of an unknown flag.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def answer(option: str, known: set[str], command: str) -> str | None:
     Returns
     -------
     str or None
-        None if the flag is in no list.
+        None if `foreign_answer` knows neither a flag of the command nor a section.
     """
     found = foreign_answer(option.lstrip("-"), {flag.removeprefix("--") for flag in known})
     if found is None:
@@ -34,7 +34,7 @@ def answer(option: str, known: set[str], command: str) -> str | None:
 
 
 def answer_error(error: Any) -> str | None:
-    """Return the sentence of `answer` for an error of the parser; None for other errors."""
+    """Return the sentence of `answer` if the error is about an unknown flag; None otherwise."""
     option, context = getattr(error, "option_name", None), getattr(error, "ctx", None)
     if type(error).__name__ != "NoSuchOption" or option is None or context is None:
         return None

@@ -24,7 +24,7 @@ class LazyGroup(TyperGroup):
         return list(COMMANDS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Import and return a subcommand. While a shell completes a name, return a placeholder instead."""
+        """Import and return a subcommand; return a placeholder while a shell completes a name."""
         if cmd_name not in COMMANDS:
             return None
         if self._listing:

@@ -1,7 +1,7 @@
 """Writes the help of a command as text in two columns. Options are in groups, the common options first.
 
-typer prints help as tables with a column for types. If a terminal is 80 characters wide, these tables wrap
-every description after two words. Therefore this module writes text with typer's plain formatter.
+typer prints help as tables with a column for types. These tables leave little width for the descriptions if
+the terminal is 80 characters wide. Therefore this module writes text with typer's plain formatter.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ COMMON = "Common options"
 FILES, RUN = "Files", "Run"
 # Number of options above which `--help` describes only the common options.
 MANY = 30
-# Width of the first column, characters. If a name is longer, its description begins on the next line.
+# Largest width of the first column, characters. If a name is longer, its description begins on the next line.
 _FIRST_COLUMN = 26
 
 

@@ -11,10 +11,9 @@ from baker.cli.command import Run, command
 from baker.core.printable import printable
 from baker.io.settings import InspectSettings
 
-# Largest number of items of a list that are shown without -v and --json. For further items, their number is
-# shown.
+# Largest number of items of a list in text output without -v. The number of the other items follows.
 SHOWN = 20
-# Length to which texts in a table, such as hashes, are truncated, characters. -v shows them in full.
+# Length to which texts in a table, such as hashes, are truncated, characters. -v shows the whole texts.
 LONGEST = 24
 
 
@@ -51,7 +50,7 @@ def write_tree(value: Any, stream: TextIO, *, depth: int = 0, limit: int | None 
     depth : int
         Number of levels of indentation.
     limit : int or None
-        Largest number of entries shown of a list; None for all.
+        Largest number of items of a list that are written; None for all.
     """
     pad = "  " * depth
     if isinstance(value, dict):

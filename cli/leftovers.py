@@ -1,4 +1,4 @@
-"""Records the state of an output path before a command writes to it, and restores it after a kill."""
+"""Records the state of an output path before a command writes to it, and cleans up after a kill."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def survey(out: str) -> bytes:
 
 
 def restore(note: bytes) -> None:
-    """Restore the old content of an output path, and remove temporary files of the command and empty folders.
+    """Restore the old content of an output path, and remove temporary files and new folders that are empty.
 
     Parameters
     ----------

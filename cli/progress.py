@@ -1,4 +1,4 @@
-"""Shows progress: a bar if the stream is a terminal, otherwise a line every few seconds."""
+"""Shows progress as a bar if the stream is a terminal, and otherwise as a line every few seconds."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 # Shortest time between two lines, seconds, so that the log of a long bake stays readable.
 PLAIN_INTERVAL = 3.0
-# Shortest time between two equal lines about compiling, seconds.
+# Shortest time between two lines with the same words about compiling, seconds.
 COMPILING_INTERVAL = 30.0
 
 
@@ -58,7 +58,7 @@ class Reporter:
         self._bar: RichProgress | None = None
         self._task: Any = None
         self._plan: BakePlan | None = None
-        # What the last line said about compiling.
+        # Text of the last line if kernels were being compiled; otherwise empty.
         self._words = ""
         # The messages of `note`.
         self.noted: list[str] = []
@@ -85,7 +85,7 @@ class Reporter:
         return self._stopped()
 
     def note(self, message: str) -> None:
-        """Write a message above the bar."""
+        """Write a warning above the bar, or as a line if there is no bar, and remember it in `noted`."""
         if not self._quiet:
             line = f"warning: {printable(in_flags(message))}"
             with self._lock:
@@ -163,7 +163,7 @@ def _make_bar(stream: TextIO) -> RichProgress:
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
     from rich.table import Column
 
-    # Only the last column is cut if the terminal is narrow.
+    # If the terminal is too narrow, only the last column is truncated.
     cut = Column(no_wrap=True, overflow="ellipsis")
     return Progress(
         TextColumn("{task.description}", table_column=Column(no_wrap=True), markup=False),

@@ -1,4 +1,4 @@
-"""Writes the report of a bake: a short text, and for `--json` parts of the manifest."""
+"""Writes the result of a bake: a short text, or for `--json` parts of the manifest."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def write_summary(
 ) -> None:
     """Write files and exports, the duration of each stage, the warnings, and the commands to run next.
 
-    On a terminal, lines are wrapped between words. Elsewhere each message is one line.
+    If the stream is a terminal, long lines are wrapped between words.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def write_summary(
     verbose : int
         If 1 or more, statistics and numbers of rays are written as well.
     noted : collection of str
-        Messages of warnings that have been written before the bake.
+        Messages of warnings that were already written during the bake. They are left out.
     """
     manifest: dict[str, Any] = result.manifest
     if result.out is not None:

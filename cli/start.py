@@ -31,8 +31,8 @@ _signal.signal(_signal.SIGINT, _end)
 def open_missing_streams() -> None:
     """Open the null device for each standard stream that was closed before this process started.
 
-    Otherwise the next opened file would get the descriptor of this stream (0, 1 or 2), and libraries that
-    print would write into the file.
+    Otherwise the next file that is opened would get the descriptor of the closed stream (0, 1 or 2), and
+    libraries that print would write into this file.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is not None:

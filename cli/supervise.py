@@ -2,9 +2,10 @@
 
 Some C++ libraries hold Python's global interpreter lock while they work. xatlas does so for minutes on a
 large mesh. No signal handler or thread written in Python can run during that time. The parent process only
-waits, so it can always handle Ctrl-C. It forwards the signal and gives the child `GRACE` seconds to stop.
-Then it kills the child and every process that the child started, and removes unfinished output. The parent
-also reports a crash of native code, or a kill for lack of memory, in one sentence.
+waits, so it can always handle Ctrl-C and the other stopping signals. It sends SIGINT to the child and waits
+up to `GRACE` seconds for its end. Then it kills the child and all processes in the child's process group, and
+removes unfinished output. The parent also reports a crash of native code, or a kill for lack of memory, in
+one sentence.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from types import FrameType
 
 from baker.cli.interrupt import INTERRUPTED
 
-# Time that the child has to stop by itself after a signal, seconds.
+# Time between the signal to the child and its kill, seconds.
 GRACE = 0.6
 # Exit code after a crash of native code, or after a kill that the user did not request.
 RESOURCE = 4
@@ -66,8 +67,8 @@ def supervise(argv: list[str]) -> tuple[StopFlag, int | None]:
     stop : StopFlag
         Flag that stopping signals set in the child.
     notes : int or None
-        Descriptor of a file for `note_output` that the parent also reads. None on systems without `fork`, on
-        which the function returns in the only process.
+        Descriptor of a file that `note_output` writes and the parent reads. None on systems without `fork`,
+        where the function returns in the only process.
     """
     stop = StopFlag()
     if not hasattr(os, "fork"):
@@ -113,8 +114,8 @@ def note_output(notes: int | None, out: str) -> None:
 
 
 def _settle_child(parent: int) -> None:
-    # Make a new process group. Ctrl-C then reaches only the parent, which forwards it once. The parent can
-    # also kill all processes that the child started.
+    # Make a new process group. The terminal then sends the signal of Ctrl-C only to the parent, which sends
+    # it to the child once. The parent can also kill all processes that the child started.
     os.setpgid(0, 0)
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)
     from baker.core.parent_death import end_with_parent

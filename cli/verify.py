@@ -49,7 +49,7 @@ def verify(
 
 
 def write_text(found: VerifyReport, stream: TextIO, *, verbose: int) -> None:
-    """Write a table of metrics, the worst regions and texels, the limits, and whether the bake is good."""
+    """Write a table of metrics, the worst regions and texels, the limits, and the verdict."""
     for warning in found.warnings:
         stream.write(f"warning: {warning.message}\n")
     stream.write(f"{'':12}" + "".join(f"{name:>14}" for name in _COLUMNS) + "\n")

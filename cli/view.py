@@ -40,7 +40,7 @@ def view(
 ) -> None:
     """Serve the web page until Ctrl-C, which ends the command with exit code 0.
 
-    With --export, write the page and its data into a folder that any web server can show.
+    With --export, write the page and its data into a folder that any web server can serve, and end.
     """
     from baker.io.bake.read_bake import read_bake
     from baker.viewer.script import find_three

@@ -242,7 +242,7 @@ def save(
     export : str or sequence of str
         Engines for which a subfolder is written: "godot", "unity", "three" ...
     force : bool
-        Replace `out` even if baker did not write it, and bake even if the estimated memory is not free.
+        Replace `out` even if baker did not write it.
     progress : Progress
         Called with stage, fraction done and a detail as text; a truthy return value cancels.
 

@@ -131,7 +131,7 @@ def diff(
     Returns
     -------
     DiffReport
-        Error metrics of each channel that both bakes have, and the points with the largest differences.
+        Error metrics of each channel that both bakes have, and the texels with the largest errors.
 
     Raises
     ------

@@ -67,13 +67,13 @@ def check(
     progress: Progress = silent,
     **keywords: Unpack[CheckKeywords],
 ) -> CheckReport:
-    """Find defects of a scene that would make a bake fail or cause errors in its lightmap.
+    """Find defects of a scene because of which a bake would fail or its lightmap would have errors.
 
     Parameters
     ----------
     scene : Scene, str or Path
-        A scene file, or a result of `load`. For a file, errors that would stop `load` are reported as
-        findings.
+        A scene file, or a result of `load`. Most defects of a file for which `load` raises an error are
+        findings here.
     settings : CheckSettings, optional
         Which findings are ignored, which fail the check, and how cost is estimated.
     bake : BakeSettings, optional

@@ -12,7 +12,7 @@ S = TypeVar("S", bound=Settings)
 
 
 def settings_of(model: type[S], settings: S | None, keywords: Mapping[str, Any]) -> S:
-    """Return `settings`, or the defaults if it is None, with the values in `keywords` replaced.
+    """Return `settings`, or the defaults if it is None, after replacing values by those in `keywords`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Ambient occlusion: the cosine-weighted share of the hemisphere without a hit within a distance r.
+"""The channel `ao`: the cosine-weighted share of the hemisphere without a hit within a distance r.
 
     AO = 1/pi integral over the hemisphere of V(w, r) cos(theta) dw
 
@@ -17,9 +17,8 @@ def ao_layers(transport: Transport) -> tuple[Layer, ...]:
     share = transport.ambient_occlusion
     if share is None:
         raise ValueError("the ao channel needs ambient occlusion")
-    # Compute the binomial standard error. Because rays are stratified, it is an upper bound: it was measured
-    # to be 2 to 5 times the true error. Half a ray is added to the hits and to the misses, so that the error
-    # is never 0.
+    # Compute the binomial standard error. Because rays are stratified, it is an upper bound, measured as 2 to
+    # 5 times the true error. Half a ray is added to the hits and to the misses, so that the error is never 0.
     n = max(transport.ao_samples, 1)
     bounded = (share.astype(np.float64) * n + 0.5) / (n + 1.0)
     error = np.sqrt(bounded * (1.0 - bounded) / n).astype(np.float32)

@@ -24,7 +24,6 @@ class Transport:
 
     A result that no channel needs is None.
 
-
     Attributes
     ----------
     direct : DirectLight or None
@@ -60,7 +59,7 @@ class Layer:
     bound : bool
         Whether `error` is an upper bound, which may be several times the true error.
     kept : (n_front,) bool or None
-        True for texels that are not denoised.
+        True for texels that are not denoised; None if all texels are denoised.
     """
 
     value: NDArray[np.float32]

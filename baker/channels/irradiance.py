@@ -1,4 +1,4 @@
-"""Irradiance: all light that arrives at the surface, direct and indirect, in lux.
+"""The channel `irradiance`: all light that arrives at the surface, direct and indirect, in lux.
 
     E = E_direct + E_sky + E_indirect
 
@@ -15,9 +15,9 @@ from baker.channels.channel import CHANNELS, Channel, Layer, Transport
 def irradiance_layers(transport: Transport) -> tuple[Layer, ...]:
     """Return two layers, which are denoised separately: direct light from shadow rays, and gathered light.
 
-    Texels in gaps about a texel wide are not denoised. There, the irradiance of adjacent texels may differ by
-    a factor of 100, and a filter would blur it. The table shows the mean and the median relative error of
-    texels in such gaps, at resolution 256 with 64 rays per texel:
+    Texels in gaps about a texel wide are not denoised. The irradiance of adjacent texels in such a gap may
+    differ by a factor of 100, and a filter would blur it. The table shows the mean and the median relative
+    error of texels in such gaps, at resolution 256 with 64 rays per texel:
 
         scene       irradiance       denoised        not denoised
         hall        10 to 32 lx      +78 %, 33 %     +1 %, 3 %

@@ -1,8 +1,8 @@
 """Compares the maps of two finished bakes, a and b, at the same surface points.
 
-One surface point is chosen in each of a number of texels of bake a, and matched with a point on the surface
-of bake b. Each bake's map is looked up bilinearly at its own lightmap uv of the point. Bake b is the
-reference: a bias of +10 % means that bake a is brighter than bake b.
+Texels of bake a are chosen, and a surface point in each of them. For each point, the matching point on the
+surface of bake b is searched. The map of each bake is looked up bilinearly at the lightmap uv of its point.
+Bake b is the reference: a bias of +10 % means that bake a is 10 % brighter than bake b.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class ChannelDifference(Metrics):
     value, reference : (n, C) float64
         Values of bake a and of bake b.
     standard_error : (n, C) float64
-        Standard error of the reference, always 0 here.
+        Standard error of the reference. It is always 0, because the noise of bake b is not known.
     metrics : dict
         The metrics of `baker.metrics.error_metrics`, and "flip", the mean FLIP error.
     """
@@ -78,7 +78,7 @@ class DiffReport(Result):
     only_in_a, only_in_b : list of dict
         Name and node of the objects whose surface is missing in the other bake, see `baker.comparison.match`.
     unmatched : int
-        Number of points of bake a without a matching point in bake b, except points on the objects
+        Number of chosen points of bake a without a matching point in bake b, except points on the objects
         `only_in_a`.
     verdicts : list of Verdict
         Results of the limits.
@@ -106,7 +106,7 @@ class DiffReport(Result):
         return not any(verdict.failed for verdict in self.verdicts)
 
     def summary(self) -> dict[str, Any]:
-        """Return the names and values that the short text shows."""
+        """Return the names and values that `repr` and notebooks show."""
         rows: dict[str, Any] = {"passed": self.passed}
         for name, channel in self.channels.items():
             rows[f"{name} bias"], rows[f"{name} p95"] = channel.metrics["bias"], channel.metrics["p95"]
@@ -218,10 +218,10 @@ def compare(
 def _largest_error(
     value: NDArray[np.float64], reference: NDArray[np.float64], floor: float
 ) -> NDArray[np.float64]:
-    """Return (n,) float64: the relative error, or the error of the worst colour if it is larger.
+    """Return (n,) float64: the larger of the relative error of the mean and the largest error of a colour.
 
-    Two colours of equal mean differ only in the second one. It is not computed for channels whose components
-    are no colours.
+    Only the error of a colour is above 0 at points whose values differ but have equal means. Channels without
+    three components, and channels with negative reference values, have no error of a colour.
     """
     error = relative_error(value, reference, floor)
     if value.shape[1] != 3 or (reference < 0).any():
@@ -230,7 +230,10 @@ def _largest_error(
 
 
 def _owners(bake: StoredBake, sides: ComparedSurfaces) -> NDArray[np.int32]:
-    """Return (P, H, W) int32: the instance of each texel of bake a, -1 for texels that are not compared."""
+    """Return (P, H, W) int32: the instance of each texel of bake a, -1 for texels that are not compared.
+
+    Invalid and dilated texels, and texels of objects that bake b lacks, are not compared.
+    """
     owner = instance_map(sides.a, bake.atlas.n_pages, bake.atlas.resolution)
     covered = np.isin(bake.status, (TexelStatus.COVERED, TexelStatus.UNCONVERGED))
     return np.where(covered & ~sides.missing_a[owner], owner, -1).astype(np.int32)

@@ -14,9 +14,9 @@ from baker.io.bake.read_bake import StoredBake
 def manifest_differences(a: StoredBake, b: StoredBake, pairs: ObjectPairs) -> list[dict[str, Any]]:
     """Return the entries in which two manifests differ, as dictionaries with the keys `what`, `a` and `b`.
 
-    `what` is the name of the entry; `a` and `b` are its values in the two bakes. The function compares
-    settings, input, versions, lights, pages and channels. It also compares the world matrices of each pair of
-    objects.
+    `what` is the name of the entry; `a` and `b` are its values in the two bakes, None if it is missing. The
+    function compares input (except the path), settings, versions, number and size of pages, channels and
+    lights. It also compares the world matrices of each pair of objects.
 
     Parameters
     ----------

@@ -3,8 +3,8 @@
 `baker.comparison.pairs` pairs the objects of both bakes. If the two objects of a pair have equal meshes, the
 matching point is in the triangle with the same number and has the same barycentric weights. So the difference
 of a bake from itself is exactly 0, and objects that were moved between the bakes are still compared. If the
-meshes differ, the nearest point of b is searched along the normal. This point must be within a small distance
-in world space, on a face with a similar normal.
+meshes differ, or the object has no partner, the nearest surface of b is searched along the normal. It must be
+within a small distance in world space, and its face must have a similar normal.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from baker.trace.packets import new_packet_buffers
 # Largest distance between matched points, as a share of the diagonal of the object's bounding box. For
 # objects without a partner, it is the box of all such objects together.
 _MAX_DISTANCE = 1.0e-3
-# Triangles of b are moved along their normals by this share of the largest distance. If two faces are back to
-# back, a ray then hits the front-facing one first.
+# Distance by which triangles of b are moved along their normals, as a share of the largest distance. If two
+# faces are back to back, a ray then hits the front-facing one first.
 _LIFT = 0.01
-# Smallest cosine of the angle between the normals of matched faces.
+# The cosine of the angle between the normals of matched faces is above this number.
 _ALIKE = 0.5
 # Largest number of hits that are tested along a ray.
 _LAYERS = 4
@@ -193,7 +193,11 @@ def _near(
     normal: NDArray[np.float64],
     max_distance: float,
 ) -> TrianglePoints:
-    """Trace rays along the normals of n points, and return the nearest hits on faces with similar normals.
+    """Return, for n points, the nearest points on triangles along the points' normals.
+
+    A ray passes through each point, from `max_distance` in front of the point to `max_distance` behind it. Of
+    its first `_LAYERS` hits on faces with similar normals, the hit nearest to the point is returned. The
+    triangle is -1 if there is none.
 
     Parameters
     ----------
@@ -210,7 +214,7 @@ def _near(
         return TrianglePoints(triangle, np.zeros((n, 3)))
     face = geometry.face_normal[wanted].astype(np.float64)
     corner = geometry.position[geometry.triangle[wanted]].astype(np.float64)
-    # Make positions relative to the centre of the triangles, because single precision is finest around 0.
+    # Make positions relative to the mean of the triangles' corners, because float32 is most accurate near 0.
     centre = corner.reshape(-1, 3).mean(axis=0)
     lifted = corner - centre + _LIFT * max_distance * face[:, None]
     index = np.arange(3 * len(wanted), dtype=np.int32).reshape(-1, 3)

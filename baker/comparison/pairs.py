@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from baker.core.scene import Instance, Mesh, Scene
 
-# Largest difference between coordinates that count as equal, relative to the mesh's largest coordinate.
+# Largest difference between coordinates that count as equal, as a share of the mesh's largest coordinate.
 _NEAR = 1.0e-6
 
 
@@ -89,7 +89,7 @@ def _pair(
 
 
 def _same_mesh(a: Mesh, b: Mesh) -> bool:
-    """Return whether the triangles of two meshes have the same corners, in the same order."""
+    """Return whether the triangles of two meshes have equal corner positions, in the same order."""
     if a.triangle.shape != b.triangle.shape:
         return False
     if not len(a.triangle):

@@ -15,8 +15,8 @@ from baker.io.bake.read_bake import StoredBake
 from baker.metrics.flip import flip_error
 from baker.metrics.texel_area import look_up_uv, one_surface_point
 
-# Largest number of rows and columns for which FLIP is computed; larger pages are subsampled. FLIP takes two
-# seconds for 512 x 512 texels.
+# Largest number of rows and columns for which FLIP is computed. Rows and columns of larger pages are left
+# out, because FLIP takes two seconds for 512 x 512 texels.
 _LARGEST = 512
 
 

@@ -1,4 +1,4 @@
-"""The settings of a comparison of two bakes."""
+"""Defines the settings of a comparison of two bakes."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Connects to a dask.distributed cluster; no other file imports dask.distributed.
 
-The scheduler sends the data that tasks share to each worker once. If a worker is lost, its tasks are rerun on
-other workers.
+Data that several tasks read are sent to each worker once. If a worker is lost, other workers repeat its
+tasks.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from baker.core.stage import Stage
 from baker.distributed.tile_worker import Result, Span, TileWorker
 from baker.io.bake.manifest import library_versions
 
-# Timeout for connecting to a scheduler with workers, and for closing the connection, seconds.
+# Timeout for connecting to a scheduler, for the first worker, and for closing the connection, seconds.
 _CONNECT = 10
-# Time without any worker after which the work is cancelled, seconds.
+# Time without any worker after which the work ends with an error, seconds.
 _ALONE = 30.0
 # Time between two checks for workers, seconds.
 _POLL = 1.0
@@ -33,14 +33,15 @@ class Cluster:
     Parameters
     ----------
     address : str
-        "tcp://HOST:8786" of a scheduler, or "local:N" for N worker processes of this machine.
+        "tcp://HOST:8786" or "tls://HOST:8786" of a scheduler, or "local:N" for N new worker processes on this
+        machine.
     threads : int
-        Number of threads that the N workers of "local:N" share.
+        Number of threads of the N workers of "local:N" together; each worker has at least one thread.
 
     Raises
     ------
     SettingsError
-        If the address has neither of these forms.
+        If the address has none of these forms, or N is not from 1 to 1024.
     ResourceError
         If dask.distributed is not installed, no scheduler with a worker answers, or a worker has different
         library versions.
@@ -97,11 +98,11 @@ class Cluster:
         return self._client.scatter([value], broadcast=True, hash=False)[0]
 
     def submit(self, work: Callable[..., Any], *arguments: Any) -> Any:
-        """Run `work(*arguments)` in a worker that the scheduler chooses; return the task."""
+        """Start `work(*arguments)` in a worker that the scheduler chooses; return the task."""
         return self._client.submit(_checked, library_versions(), work, *arguments, pure=False)
 
     def finished(self, tasks: Sequence[Any]) -> list[Any]:
-        """Return the tasks that have ended."""
+        """Return those of the tasks that have ended, successfully or not."""
         return [task for task in tasks if task.status != "pending"]
 
     def result(self, task: Any) -> Any:
@@ -112,8 +113,10 @@ class Cluster:
         BakerError
             If the task raised a `BakerError`, or if workers died repeatedly while they ran it.
         KeyError
-            If data of the task were lost together with a worker. Send the data again, and submit the task
-            again.
+            If data of the task were lost together with a worker. The caller must send the data and submit the
+            task again.
+        Exception
+            If the task raised another exception.
         """
         try:
             if task.status == "finished":
@@ -159,7 +162,7 @@ def _compare(address: str, here: Mapping[str, Any], there: Mapping[str, Any]) ->
 
 
 def _checked(versions: dict[str, Any], work: Callable[..., Any], *arguments: Any) -> Any:
-    """Run in a worker: compare the library versions, and then call `work`.
+    """In a worker: compare the library versions, and then call `work`.
 
     `Cluster` compares the versions of its workers when it connects, but this worker may have joined later.
     """
@@ -170,19 +173,19 @@ def _checked(versions: dict[str, Any], work: Callable[..., Any], *arguments: Any
 
 
 class WorkerWatch:
-    """Raises an error if a cluster has had no worker for `_ALONE` seconds."""
+    """Raises an error if checks have found no worker of a cluster for more than `_ALONE` seconds."""
 
     def __init__(self, cluster: Cluster) -> None:
         self.cluster = cluster
         self.seen = self.checked = time.monotonic()
 
     def check(self) -> None:
-        """Check for workers, at most once a second.
+        """Check for workers, unless the last check was less than a second ago.
 
         Raises
         ------
         ResourceError
-            After half a minute without any worker.
+            If there is no worker, and there was none for more than half a minute.
         """
         now = time.monotonic()
         if now - self.checked < _POLL:
@@ -195,7 +198,7 @@ class WorkerWatch:
 
 
 def held_bakes() -> dict[str, TileWorker]:
-    """Run in a worker: return the `TileWorker` objects that the worker keeps, by hash of the bake."""
+    """In a worker: return the `TileWorker` objects that the worker keeps, by hash of the bake."""
     from distributed import get_worker
 
     held: dict[str, TileWorker] = vars(get_worker()).setdefault("baker_bakes", {})
@@ -203,7 +206,7 @@ def held_bakes() -> dict[str, TileWorker]:
 
 
 def worker_threads() -> int:
-    """Run in a worker: return the number of its threads."""
+    """In a worker: return the number of its threads."""
     from distributed import get_worker
 
     return int(get_worker().state.nthreads)
@@ -216,7 +219,10 @@ def work_on_tiles(
     arrays: Mapping[str, NDArray[Any]],
     spans: list[Span],
 ) -> Result:
-    """Run in a worker: return the results of the tiles `spans` of the bake with the hash `key`."""
+    """In a worker: return the results of the tiles `spans` of a stage of the bake with the hash `key`.
+
+    `parts` are scene, atlas and settings of the bake, and `arrays` the results of earlier stages.
+    """
     held = held_bakes()
     if key not in held:
         scene, atlas, settings = parts

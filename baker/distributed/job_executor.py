@@ -20,7 +20,9 @@ from baker.pipeline.bake import bake
 
 
 class DistributedJobExecutor:
-    """Runs one bake at a time on each worker of a cluster; implements `baker.jobs.executor.JobExecutor`.
+    """Runs whole bakes on the workers of a cluster; implements `baker.jobs.executor.JobExecutor`.
+
+    The number of slots is the number of workers when the object is made.
 
     Parameters
     ----------
@@ -46,7 +48,10 @@ class DistributedJobExecutor:
             self._failed.append(Event(ticket, ended=True, error=describe(error)))
 
     def next_event(self, timeout: float) -> Event | None:
-        """Wait at most `timeout` seconds for the end of a bake, and write its output folder."""
+        """Wait at most `timeout` seconds for the end of a bake, and write its output folder.
+
+        A bake whose data were lost together with a worker is submitted again, which is an event as well.
+        """
         end = time.monotonic() + timeout
         while not self._failed:
             for task in self.cluster.finished(list(self._tasks)):
@@ -58,7 +63,7 @@ class DistributedJobExecutor:
         return self._failed.pop(0)
 
     def close(self) -> None:
-        """Disconnect; the output folders of running bakes are not written."""
+        """Disconnect from the cluster. The output folders of running bakes are not written."""
         self._tasks.clear()
         self.cluster.close()
 
@@ -84,6 +89,6 @@ class DistributedJobExecutor:
 
 
 def bake_scene(scene: Scene, settings: BakeSettings) -> BakeResult:
-    """Run in a worker: bake, and return the result without the scene."""
+    """In a worker: bake, and return the result without meshes, materials and instances of the scene."""
     result = bake(scene, settings=settings.model_copy(update={"threads": worker_threads()}))
     return replace(result, scene=replace(scene, meshes=(), materials=(), instances=()))

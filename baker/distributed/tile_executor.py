@@ -20,10 +20,12 @@ from baker.core.stage import Stage
 from baker.distributed.connection import Cluster, WorkerWatch, work_on_tiles
 from baker.distributed.tile_worker import Span
 
-# Number of tasks per thread and stage. More tasks balance the threads better, but each task has an overhead.
+# Intended number of tasks per thread and stage. More tasks balance the threads better, but each task has an
+# overhead.
 _TASKS_PER_THREAD = 8
 # Largest number of tiles in a task. It limits the work that is repeated if a worker is lost.
 _MAX_TILES = 64
+# Time between two searches for finished tasks, seconds.
 _POLL = 0.02
 
 
@@ -43,7 +45,7 @@ class DistributedTileExecutor:
         self._sent: Any = None
 
     def open(self, scene: Scene, atlas: Atlas, settings: BakeSettings) -> None:
-        """Send scene, atlas and settings to each worker, once."""
+        """Send scene, atlas and settings to all workers."""
         # Do not send the source document and the path, which only writing needs.
         self._parts = (replace(scene, source=None, path=None), atlas, settings)
         self._key = hashlib.sha256(pickle.dumps(self._parts, 5)).hexdigest()
@@ -72,7 +74,7 @@ class DistributedTileExecutor:
         return run
 
     def close(self) -> None:
-        """Release the scene in this process; workers keep their copy until the next bake."""
+        """Release the scene in this process. Workers keep their prepared scene until the next bake."""
         self._parts = self._sent = None
 
     def _submitter(self, stage: Stage, arrays: dict[str, NDArray[Any]]) -> Callable[[list[Span], bool], Any]:

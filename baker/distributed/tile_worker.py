@@ -1,7 +1,8 @@
-"""Computes tiles of a distributed bake; runs in a worker.
+"""Computes tiles of a distributed bake in a worker.
 
 The worker builds texels, ray tree and lookup tables from the same scene, atlas and settings as the process
-that started the bake, so both have identical arrays. Only results of earlier stages are sent in addition.
+that started the bake, so both have identical arrays. Apart from these inputs, only results of earlier stages
+are sent to the worker.
 """
 
 from __future__ import annotations
@@ -70,7 +71,7 @@ class TileWorker:
         arrays : mapping of str to array
             Results of earlier stages, the same for all tiles of a stage.
         spans : list of (begin, end)
-            Tiles as ranges of items, end exclusive, with the bounds that the stage would use itself.
+            Tiles as ranges of items, end exclusive. They are tiles into which the stage divides its items.
 
         Returns
         -------
@@ -87,7 +88,10 @@ class TileWorker:
         return found
 
     def _stage(self, stage: Stage, arrays: Arrays) -> StageWork:
-        """Return the function that runs a stage, prepared once; other threads of this worker wait for it."""
+        """Return the function that runs a stage.
+
+        Scene and stage are prepared by the first thread that needs them. Other threads wait for it.
+        """
         with self._lock:
             if self._prepared is None:
                 record = Record(silent)
@@ -120,7 +124,7 @@ def _ambient_occlusion(prepared: PreparedScene, arrays: Arrays) -> StageWork:
     return lambda run: trace_ambient_occlusion(prepared, run)
 
 
-# Stage with tiles -> function that prepares it from the results of earlier stages.
+# Keys: stages with tiles. Values: functions that prepare the stage from the results of earlier stages.
 STAGES: dict[Stage, Callable[[PreparedScene, Arrays], StageWork]] = {
     Stage.DIRECT_LIGHT: _direct_light,
     Stage.FORM_FACTORS: _form_factors,

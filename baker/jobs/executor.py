@@ -1,4 +1,4 @@
-"""Defines `JobExecutor`, and implements it with worker processes on this machine."""
+"""Defines the interface `JobExecutor`, and implements it with worker processes on this machine."""
 
 from __future__ import annotations
 
@@ -29,8 +29,9 @@ class Event:
     fraction : float
         Completed share of the stage, 0 to 1.
     ended : bool
+        Whether the job has ended, successfully or not.
     error : dict or None
-        {kind, message, file, object, code} if the job failed.
+        {kind, message, file, object, code} if the job failed; None otherwise.
     """
 
     ticket: int
@@ -48,7 +49,7 @@ class JobExecutor(Protocol):
         """Return the number of jobs that may run at the same time."""
 
     def start(self, ticket: int, job: Job, *, threads: int, force: bool) -> None:
-        """Start a job; the caller never has more than `slots` jobs running."""
+        """Start a job. The caller must not start a job while `slots` jobs are running."""
 
     def next_event(self, timeout: float) -> Event | None:
         """Return the next event of any job.
@@ -63,7 +64,7 @@ class JobExecutor(Protocol):
 
 @dataclass(frozen=True)
 class _Work:
-    """A job and the arguments that it was started with; `again` if a worker died while it baked the job."""
+    """A job and its arguments of `start`. `again` is true if a worker has died while it baked the job."""
 
     ticket: int
     job: Job
@@ -75,12 +76,12 @@ class _Work:
 class LocalJobExecutor:
     """Bakes in worker processes; each process bakes one job after another.
 
-    If a process dies, a new process repeats its job. If that process dies, too, the job has failed.
+    If a process dies during a job, a new process repeats the job. If that process dies, too, the job fails.
 
     Parameters
     ----------
     slots : int
-        Largest number of processes. A process is started when a job needs it.
+        Largest number of processes that bake at the same time. A process is started if none is idle.
     """
 
     def __init__(self, slots: int) -> None:
@@ -124,7 +125,7 @@ class LocalJobExecutor:
         return self._repeat(work)
 
     def _repeat(self, work: _Work) -> Event:
-        """Give a job at which a worker has died to a new worker, because an idle one may be dead, too."""
+        """Start a job again in a new worker, because an idle worker may be dead, too."""
         try:
             worker = _Worker(self._heard)
         except OSError as error:
@@ -170,9 +171,9 @@ class _Worker:
         self.heard.put((self, {"died": self.process.wait()}))
 
     def end(self, job: Job | None) -> None:
-        """Kill the process. Undo an incomplete write to the output folder of its current job, `job`.
+        """Kill the process. If `job` is given, undo an incomplete write to its output folder.
 
-        The temporary folders of this output are deleted.
+        The temporary folders of this output folder are deleted.
         """
         self.process.kill()
         self.process.wait()

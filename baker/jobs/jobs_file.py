@@ -1,9 +1,9 @@
 """Reads a job file (TOML): scenes, their output folders and their settings.
 
-    [defaults]             any setting of a bake, and `out`
-    [[job]]                `scene` or `glob`, `out`, any setting
+    [defaults]             keys: `out` and the settings of a bake
+    [[job]]                keys: `scene` or `glob`, `out` and the settings of a bake
 
-Paths are relative to the folder of the job file, so that the folder can be moved with its scenes.
+Relative paths refer to the folder of the job file, so that the folder can be moved with its scenes.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ class Job:
     Attributes
     ----------
     scene : Path
-        The scene file, or the pattern of a glob that matched no file.
+        The scene file, or a pattern that matched no scene file.
     out : Path or None
-        The output folder. None if a glob matched no file.
+        The output folder; None if `scene` is a pattern.
     settings : BakeSettings
     problem : str
         Why the job cannot be started; empty if it can.
@@ -46,7 +46,7 @@ class Job:
 
 
 def read_jobs(path: Path, overrides: dict[str, Any]) -> list[Job]:
-    """Return the jobs of a file, in the order of the file; the scenes of a glob are sorted by name.
+    """Return the jobs of a file, in the order of the file. Scenes that match a pattern are sorted by path.
 
     Parameters
     ----------
@@ -65,8 +65,8 @@ def read_jobs(path: Path, overrides: dict[str, Any]) -> list[Job]:
     InputError
         If the file is missing or unreadable.
     SettingsError
-        If the file is not TOML, contains an unknown key or an invalid setting, gives two jobs the same output
-        folder, or puts one output folder inside another.
+        If the file is not TOML, has no job, has a missing, unknown or invalid key, gives two jobs the same
+        output folder, or puts one output folder inside another.
     """
     document = _parse(path)
     defaults = document.get("defaults", {})
@@ -111,7 +111,7 @@ def _check_keys(path: Path, where: str, table: dict[str, Any], own: tuple[str, .
 
 
 def _expand(path: Path, where: str, table: dict[str, Any], overrides: dict[str, Any]) -> list[Job]:
-    """Return the jobs of one `[[job]]` table: one for each scene."""
+    """Return the jobs of one `[[job]]` table, one for each scene and for each pattern without a match."""
     values = {key.replace("-", "_"): value for key, value in table.items()}
     given = {key: _words(path, where, key, values.pop(key)) for key in ("scene", "glob") if key in values}
     if len(given) != 1:
@@ -154,7 +154,7 @@ def _check_path(path: Path, where: str, key: str, word: str) -> None:
 
 
 def _find(path: Path, where: str, pattern: str) -> list[Path]:
-    """Return the scene files that match a pattern, except hidden files and files that bakes have written."""
+    """Return the scene files that match a pattern, without hidden files and files that bakes have written."""
     import glob
 
     from baker.io.load import IMPORTERS

@@ -19,7 +19,7 @@ def parse_size(text: str) -> int:
     Raises
     ------
     SettingsError
-        If the text is not a size, or the size is 0.
+        If the text is not a size, or the size is less than a byte.
     """
     match = re.fullmatch(r"\s*([0-9]*\.?[0-9]+)\s*([KMGT]?)(?:I?B)?\s*", text.upper())
     size = 0 if match is None else int(float(match.group(1)) * _UNITS[match.group(2)])
@@ -29,7 +29,7 @@ def parse_size(text: str) -> int:
 
 
 def size_words(size: int) -> str:
-    """Return a size in bytes as text, such as "1.5G", with three digits."""
+    """Return a size in bytes as text with at most three significant digits, such as "1.5G"."""
     for unit in ("T", "G", "M", "K"):
         if size >= _UNITS[unit]:
             return f"{size / _UNITS[unit]:.3g}{unit}"

@@ -1,4 +1,4 @@
-"""Runs a batch with one function, and reports the outcomes."""
+"""Runs a job file, and defines the report of its outcomes."""
 
 from __future__ import annotations
 
@@ -26,8 +26,7 @@ class BatchReport(Result):
     outcomes : list of Outcome
         One for each job, in the order of the job file.
     dry_run : bool
-        Whether this was a dry run: nothing was baked, and the states are those that a batch is expected to
-        give.
+        Whether nothing was baked, so that `outcomes` has the states that are expected.
     """
 
     outcomes: list[Outcome]
@@ -44,7 +43,7 @@ class BatchReport(Result):
         return {state: counts[state] for state in ("baked", "unchanged", "failed")}
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the report as plain values: the JSON object that `baker batch --json` prints."""
+        """Return the JSON object that `baker batch --json` prints."""
         return batch_json(self.outcomes, dry_run=self.dry_run)
 
 
@@ -61,7 +60,7 @@ def run_jobs_file(
     Parameters
     ----------
     jobs_file : Path
-        TOML file of scenes and settings.
+        TOML file of scenes and settings, see `baker.jobs.jobs_file`.
     settings : BatchSettings
         Settings of the batch: processes, memory, seed and others.
     progress : Progress
@@ -81,7 +80,7 @@ def run_jobs_file(
     InputError
         If the file cannot be read.
     SettingsError
-        If the file is not TOML, or a setting in it is invalid.
+        If the file is not TOML, a setting in it is invalid, or `memory` is not a size.
     Cancelled
         If `progress` returned a truthy value.
     """

@@ -21,7 +21,7 @@ from baker.jobs.executor import Event, JobExecutor
 from baker.jobs.jobs_file import Job
 from baker.jobs.up_to_date import Freshness, check_output
 
-# Time between two progress reports, and between two attempts to acquire a lock, seconds.
+# Longest time between two progress reports, and between two attempts to acquire a lock, seconds.
 _LOOK = 0.1
 
 
@@ -38,7 +38,7 @@ class BatchOptions:
     force : bool
         Also bake jobs that are up to date, and write into folders that baker did not write.
     fail_fast : bool
-        Start no further jobs after a failure.
+        Start no further jobs after a bake has failed. Running jobs continue.
     dry_run : bool
         Only report the jobs that would be baked.
     """
@@ -62,7 +62,7 @@ class Outcome:
     why : str
         The reason for the state, as text for users.
     seconds : float
-        Duration of the bake, seconds. If the job was not baked, the duration of its examination, or 0.
+        Duration of the bake, seconds. If the job was not baked, the duration of its examination or 0.
     code : int
         Exit code for a failed job; 0 otherwise.
     """
@@ -97,7 +97,10 @@ def run_batch(
     progress: Progress,
     starting: Callable[[Path], None] = lambda out: None,
 ) -> list[Outcome]:
-    """Bake the jobs that are not up to date; start them in order, several at a time.
+    """Bake the jobs that are not up to date, several at a time.
+
+    They are started in the order of `jobs`. If the memory limit or a lock delays a job, later jobs may start
+    first.
 
     Parameters
     ----------
@@ -204,7 +207,7 @@ class _Run:
         return peak
 
     def start_some(self) -> None:
-        """Start waiting jobs while slots and memory are free; skip jobs locked by another run."""
+        """Start waiting jobs while slots are free; skip jobs that exceed the free memory or are locked."""
         for ticket in list(self.waiting):
             if len(self.running) >= self.executor.slots:
                 return

@@ -2,8 +2,8 @@
 
 An output folder is up to date if these entries of its manifest equal the current values:
 
-- the hash of the scene file together with the files that it refers to;
-- the settings;
+- the hash of the scene file and the files that it refers to;
+- the settings, except those in `_NOT_COMPARED`;
 - the versions of baker and its libraries;
 - the hash of each written file.
 """
@@ -36,7 +36,7 @@ class Freshness:
     fresh : bool
         Whether the folder is up to date.
     why : str
-        The reason, as text for users, such as a list of differences.
+        The reason as text for users: up to `_TOLD` differences, or a sentence.
     manifest : bytes
         Content of `bake.json`, empty if there is none.
     """

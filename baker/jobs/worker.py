@@ -23,13 +23,13 @@ from baker.core.parent_death import end_with_parent
 
 # Shortest time between two progress messages, seconds.
 _INTERVAL = 0.1
-# Time that a running bake has to stop between the end of stdin and the exit of the process, seconds.
+# Time between the end of stdin, which asks a running bake to stop, and the exit of the process, seconds.
 _GRACE = 0.6
 
 
 def main() -> None:
     """Bake jobs until stdin ends."""
-    # Ignore Ctrl-C, which the whole process group receives; the parent stops this process.
+    # Ignore Ctrl-C, which all processes of the group receive, because the parent stops this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent(int(sys.argv[1]))
     # Native libraries may print to stdout: redirect descriptor 1 to stderr, and keep a copy for the messages.
