@@ -1,6 +1,6 @@
 """Builds the table of the viewer page's addresses and contents, for the server and for exported pages.
 
-The table is filled before the page is shown, so no other file can be read through it.
+The table is complete before the first request, so requests cannot read other files.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ Answer = tuple[str, Callable[[], bytes]]
 
 
 def page_answers(bake: StoredBake, three: ThreeScript) -> dict[str, Answer]:
-    """Return the answers of all addresses, relative to the page, whose own address is "".
+    """Return the answer for each address. Addresses are relative to that of the page, which is "".
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def page_answers(bake: StoredBake, three: ThreeScript) -> dict[str, Answer]:
     Returns
     -------
     dict of str to Answer
-        Media type of each address, and the function that returns its bytes.
+        For each address, the media type and a function that returns the bytes.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Writes the viewer page with all its data as static files, which any web server can show."""
+"""Writes the viewer page with all its data as static files, which any web server can serve."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from baker.io.temporary import TemporaryFolder, remove_abandoned
 from baker.viewer.answers import POLICY, page_answers
 from baker.viewer.script import ThreeScript
 
-# Name of the file that lists the other files of an exported page. A folder is replaced only if this list has
-# all files of the folder.
+# Name of the file that lists the other files of an exported page. A folder is replaced only if it is empty,
+# or if this list contains all its other files.
 LIST_NAME = "files.json"
 _CHARSET = '<meta charset="utf-8">'
 
@@ -52,7 +52,7 @@ def export_page(bake: StoredBake, three: ThreeScript, folder: Path) -> list[str]
     InputError
         If the manifest names an unknown channel.
     SettingsError
-        If `folder` is a file, holds other files, or cannot be replaced.
+        If `folder` is a file, contains a file that is not part of an exported page, or cannot be replaced.
     ResourceError
         If the files cannot be written; the folder is unchanged.
     """
@@ -89,9 +89,10 @@ def checked_folder(folder: Path) -> Path:
     Raises
     ------
     SettingsError
-        If it is a file, contains a file that is not of an exported page, or cannot be renamed.
+        If the folder is a file or the root of the file system, contains a file that is not part of an
+        exported page, or cannot be renamed.
     ResourceError
-        If it cannot be read.
+        If the folder cannot be read.
     """
     target = resolved_output(folder)
     if not target.name:
@@ -130,7 +131,7 @@ def _foreign_file(folder: Path) -> str | None:
 
 def _write(bake: StoredBake, three: ThreeScript, folder: Path) -> list[str]:
     """Write all files into the new folder `folder`; return their names."""
-    # The page links only the maps of the bake; its other files may be large.
+    # Of the files of the bake, write only the maps, because the page links no others.
     linked = {f"out/{page['file']}" for page in bake.manifest["pages"]}
     names = []
     for address, (_, content) in page_answers(bake, three).items():
@@ -150,7 +151,7 @@ def _write(bake: StoredBake, three: ThreeScript, folder: Path) -> list[str]:
 
 
 def _with_policy(page: bytes) -> bytes:
-    """Return the page with the rules of the server's Content-Security-Policy as a meta tag."""
+    """Return the page with `POLICY` as a meta tag."""
     tag = f'<meta http-equiv="Content-Security-Policy" content="{html.escape(POLICY)}">'
     return page.decode().replace(_CHARSET, f"{_CHARSET}\n  {tag}", 1).encode()
 
@@ -169,13 +170,13 @@ def _write_list(folder: Path, names: list[str]) -> None:
 
 
 def _move(home: Path, target: Path) -> None:
-    """Move the folder `new` in `home` to `target`; the old page ends up in `home`."""
+    """Move the folder `new` in `home` to `target`, and an old page from `target` to `home`."""
     new = home / "new"
     if not target.exists():
         new.rename(target)
         return
     shutil.copymode(target, new)
     if not exchange_paths(new, target):
-        # The file system has no exchange: for a moment there is no page.
+        # The file system cannot exchange two folders, so `target` is missing for a moment.
         target.rename(home / "old")
         new.rename(target)

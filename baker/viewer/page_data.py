@@ -1,6 +1,6 @@
 """Converts lightmap pages to arrays that the browser uploads to the GPU unchanged.
 
-Values from a half-float EXR are sent as half floats, so that the browser has exactly the values of the EXR.
+Values from a half-float EXR are sent as half floats, which need half the memory and are exact.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 
 def page_numbers(page: NDArray[np.float32]) -> NDArray[Any]:
-    """Return a page with one or four components per texel, as half floats if that loses nothing.
+    """Return a page with one or four components per texel, as half floats if these store all values exactly.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ def page_numbers(page: NDArray[np.float32]) -> NDArray[Any]:
     Returns
     -------
     (H, W, 1) or (H, W, 4) float16 or float32
-        Pages with two or three components get four, because not all graphics hardware supports
+        Pages with two or three components get four components, because not all graphics hardware supports
         three-component float textures. Added components are 1.
     """
     height, width, channels = page.shape

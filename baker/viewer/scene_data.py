@@ -35,7 +35,8 @@ class SceneData:
     header : dict
         The content of `scene.json`.
     geometry : bytes
-        All arrays, concatenated; `header["sections"]` has the name, byte offset, shape and type of each.
+        All arrays, concatenated. `header["sections"]` has, by name of the array, its byte offset, number of
+        rows, number of columns and type.
     images : tuple of (H, W, 4) uint8 or float32
         Textures of base colour and emission: the arrays of `Texture.image`.
     """
@@ -75,7 +76,7 @@ def scene_data(bake: StoredBake) -> SceneData:
         "pages": bake.atlas.n_pages,
         "triangles": len(geometry.triangle),
         "box": {"min": position.min(axis=0).tolist(), "max": position.max(axis=0).tolist()},
-        # World position of the origin that vertex positions, the box and the camera are relative to.
+        # World position that vertex positions, the box and the camera are relative to.
         "origin": geometry.origin.tolist(),
         "camera": _camera(bake),
         "suggestedExposure": bake.manifest.get("suggested_exposure"),
@@ -104,7 +105,7 @@ def _arrays(bake: StoredBake, geometry: Geometry, order: NDArray[Any]) -> dict[s
         "colour": vertex_colour(bake.scene, geometry),
     }
     n_vertices = len(geometry.position)
-    wide = {  # expand attributes with one row for all vertices
+    wide = {  # repeat the row of attributes that have one row for all vertices
         name: np.broadcast_to(array, (n_vertices, array.shape[1])) if len(array) == 1 else array
         for name, array in arrays.items()
     }
@@ -181,7 +182,10 @@ def _camera(bake: StoredBake) -> dict[str, Any] | None:
 
 
 def _channel(bake: StoredBake, name: str) -> dict[str, Any]:
-    """Return a channel's unit, files and the 1, 50 and 99 % percentiles of luminance over covered texels."""
+    """Return a channel's unit, files and the percentiles 1, 50 and 99 of its values at texels on surfaces.
+
+    The values are luminances if the channel has three components, and otherwise the first component.
+    """
     pages = [page for page in bake.manifest["pages"] if page["channel"] == name]
     value = bake.maps[name]
     covered = (bake.status != TexelStatus.EMPTY) & (bake.status != TexelStatus.DILATED)

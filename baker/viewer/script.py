@@ -12,7 +12,8 @@ from pathlib import Path
 
 from baker.core.errors import InputError, ResourceError
 
-# Paths of three.js in a folder, in order of preference: in npm's package, in node_modules, as a single file.
+# Paths of three.js relative to a given folder, in order of preference. The folder may be npm's package,
+# contain `node_modules`, or contain a single file.
 _PATHS = (
     "build/three.module.min.js",
     "build/three.module.js",
@@ -43,7 +44,10 @@ class ThreeScript:
 
     @property
     def files(self) -> dict[str, Path]:
-        """Return the files that the page may request, by name; a module may import the files beside it."""
+        """Return the files that the page may request, by name.
+
+        For a module, these are all .js files in its folder, because the module may import them.
+        """
         if not self.module:
             return {self.path.name: self.path}
         return {path.name: path for path in sorted(self.path.parent.glob("*.js"))}
@@ -55,7 +59,7 @@ def find_three(location: Path | None) -> ThreeScript:
     Parameters
     ----------
     location : Path or None
-        A file, or a folder that contains npm's package; None uses the installed Python package.
+        The file of three.js, or a folder with it, see `_PATHS`; None for the installed Python package.
 
     Returns
     -------

@@ -1,9 +1,8 @@
 """Serves the viewer page and the files of a bake to a browser on this machine.
 
-A request is answered only if its path is in a table that is filled before the first request, so no other file
-can be read.
-Requests whose Host header names another machine are refused, so that a foreign site cannot read the bake
-through a host name that resolves to 127.0.0.1 (DNS rebinding).
+A request is answered only if its path is in a table that is complete before the first request, so no other
+file can be read. Requests whose Host header names another machine are refused, so that a foreign site cannot
+read the bake through a host name that resolves to 127.0.0.1 (DNS rebinding).
 """
 
 from __future__ import annotations
@@ -49,7 +48,7 @@ class ViewServer(ThreadingHTTPServer):
         return {f"{HOST}:{self.server_port}", f"localhost:{self.server_port}"}
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Ignore errors, which arise when the browser closes a connection."""
+        """Ignore errors of a connection, which arise if the browser closes it."""
 
 
 def make_server(bake: StoredBake, three: ThreeScript, *, port: int = 0) -> ViewServer:
@@ -74,7 +73,7 @@ def make_server(bake: StoredBake, three: ThreeScript, *, port: int = 0) -> ViewS
     InputError
         If the manifest names an unknown channel.
     ResourceError
-        If the port is in use or not permitted.
+        If the port is in use, or this user may not use it.
     """
     answers = {f"/{address}": answer for address, answer in page_answers(bake, three).items()}
     try:

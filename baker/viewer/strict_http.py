@@ -17,7 +17,7 @@ _FIELD = re.compile(rb"([!#$%&'*+.^_`|~0-9A-Za-z-]+):[ \t]*([^\x00-\x08\x0a-\x1f
 
 
 def fault_of_request(request_line: bytes, fields: Sequence[bytes], names: Collection[str]) -> str | None:
-    """Return the reason if a request is ambiguous or names another server, else None.
+    """Return the reason if a request is ambiguous, names another server or has a body, else None.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def fault_of_request(request_line: bytes, fields: Sequence[bytes], names: Collec
     Returns
     -------
     str or None
-        A short reason; None for a request that can be answered.
+        A short text for the response, or None.
     """
     line = _REQUEST_LINE.fullmatch(request_line)
     if line is None:

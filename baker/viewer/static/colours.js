@@ -1,6 +1,7 @@
 // The false-colour ramp, and the colours of the texel states.
 
-// Stops of the ramp. Lightness increases evenly, so that values stay ordered in grey and with colour blindness.
+// Colours at equal distances along the ramp. Lightness increases evenly, so that the order of values is visible
+// in grey and with colour blindness.
 const STOPS = ["#140b3d", "#2d2d8f", "#1f68b5", "#179e9e", "#53c06d", "#c4d54c", "#fff2bf"];
 
 // Texel states; the index is the value in status_N.png.

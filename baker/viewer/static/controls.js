@@ -1,4 +1,4 @@
-// Handles buttons, sliders, keys and gestures: changes the application's state, then redraws.
+// Handles buttons, sliders, keys and gestures, which change the application's state and redraw the page.
 
 import { firstView, fly, frame, ray, shift, turn, zoom } from "./orbit.js";
 import { listen, ownsArrows, typing } from "./input.js";

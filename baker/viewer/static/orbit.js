@@ -3,7 +3,7 @@
 
 const LIMIT = (Math.PI / 2) * 0.999;
 
-/** Returns the first camera of the scene file; if there is none, a camera that sees the whole box. */
+/** Returns the first camera of the scene file as an orbit camera; without one, a camera that shows the whole box. */
 export function firstView(scene) {
   const low = scene.box.min;
   const high = scene.box.max;
@@ -63,7 +63,7 @@ export function shift(camera, x, y) {
   camera.target = camera.target.map((value, axis) => value + (right[axis] * x + up[axis] * y) * tall);
 }
 
-/** Moves nearer (steps > 0) or away; close to the target, moves the target as well, so that one can enter rooms. */
+/** Moves towards the target (steps > 0) or away; close to it, moves the target as well, so that users can enter rooms. */
 export function zoom(camera, steps) {
   const wanted = camera.distance * 0.86 ** steps;
   const nearest = camera.radius * 0.04;
@@ -71,7 +71,7 @@ export function zoom(camera, steps) {
   camera.distance = Math.min(Math.max(wanted, nearest), camera.radius * 40);
 }
 
-/** Moves eye and target by metres to the right, up and forward. */
+/** Moves eye and target by x metres to the right, y metres up and z metres forward. */
 export function fly(camera, x, y, z) {
   const { right, up, forward } = frame(camera);
   camera.target = camera.target.map((value, axis) => value + right[axis] * x + up[axis] * y + forward[axis] * z);

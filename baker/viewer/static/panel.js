@@ -2,7 +2,7 @@
 
 import { rampGradient, srgb, STATUS } from "./colours.js";
 
-/** Creates an element; `parts` are text and children. Strings become text nodes, so names in files cannot add HTML. */
+/** Creates an element with the children `parts`. Strings become text nodes, so names in files cannot add HTML. */
 export function element(tag, attributes = {}, ...parts) {
   const made = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
@@ -23,7 +23,7 @@ export function count(value) {
   return String(value).replace(/\B(?=(\d{3})+$)/g, "\u2009");
 }
 
-/** Fills the legend; `at` maps a position on the colour bar, 0 to 1, to a value, or is the text of a note. */
+/** Fills the legend. `at` is the text of a note, or a function from a position on the colour bar, 0 to 1, to a value. */
 export function showLegend(legend, { title, unit, kind, at }, status) {
   const heading = element("h3", {}, title);
   if (unit) heading.append(element("span", {}, ` ${unit}`));

@@ -16,7 +16,7 @@ export function pickRay(scene, images, { origin, direction }) {
   return found ? surface(scene, found.triangle, found.weights) : null;
 }
 
-/** Returns the surface at (u, v) of a page, or null. */
+/** Returns the surface at (u, v) of a page, or null if no triangle contains this point. */
 export function pickTexel(scene, page, u, v) {
   const { triangle, pageUv } = scene.arrays;
   for (const group of scene.groups) {
