@@ -148,17 +148,17 @@ class Encoding(ABC, Generic[Options]):
         """
 
     def size(self, path: Path) -> tuple[int, int] | None:
-        """Return width and height from the header of a file, so that large images need not be decoded.
+        """Return width and height from the header of a file, without decoding the pixels.
 
         Returns
         -------
         (int, int) or None
-            Pixels; None if this encoding cannot tell them.
+            Width and height, pixels. None, the default, if the encoding does not read headers.
 
         Raises
         ------
         InputError
-            As `decode`.
+            If the file cannot be read, or its header is not that of an image of this format.
         """
         return None
 
@@ -175,12 +175,12 @@ class Encoding(ABC, Generic[Options]):
 
 
 def check_size(path: Path, width: int, height: int) -> None:
-    """Refuse empty and very large images before their pixels are decoded.
+    """Raise an error for an empty or very large image, before its pixels are decoded.
 
     Parameters
     ----------
     path : Path
-        File of the image, for the message.
+        File of the image, which the error names.
     width, height : int
         Size that the header of the file states, pixels.
 
