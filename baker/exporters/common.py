@@ -12,6 +12,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import numpy as np
+
 from baker.core.encoding import DecodedImage, encoding_of
 from baker.io.gltf.packer import objects
 
@@ -22,6 +24,8 @@ DESCRIPTION_NAME = "lightmap.json"
 STANDARD_LIGHTS = ("directional", "point", "spot")
 # Key of the manifest and of `lightmap.json`.
 EXPOSURE_KEY = "suggested_exposure"
+# Header attributes of a page that `write_page` copies, because they stay valid after a division.
+_KEPT = ("colourSpace", "software")
 
 # Changes a glTF document and the content of `lightmap.json` in place.
 Change = Callable[[dict[str, Any], dict[str, Any]], None]
@@ -125,6 +129,29 @@ def decode_page(bake: Path, file: str) -> DecodedImage:
     return encoding.decode(bake / file)
 
 
+def write_page(bake: Path, file: str, target: Path, *, divisor: float, quantity: str, unit: str) -> None:
+    """Write a page of the bake, divided by a number, to the file `target`.
+
+    Parameters
+    ----------
+    bake : Path
+        Folder of the bake.
+    file : str
+        Name of the page in the bake.
+    target : Path
+        Its suffix selects the format. If it is that of `file`, the number format remains, too.
+    divisor : float
+    quantity, unit : str
+        Meaning of the written numbers, for the header of the file.
+    """
+    image, encoding = decode_page(bake, file), encoding_of(target.name)
+    assert encoding is not None, "exports choose suffixes of encodings"
+    header = {key: image.header[key] for key in _KEPT if key in image.header}
+    header |= {"quantity": quantity, "unit": unit}
+    pixels = (image.pixels.astype(np.float64) / divisor).astype(np.float32)
+    encoding.encode(target, pixels, options=encoding.options_of_image(image), header=header)
+
+
 def template(export: str, name: str) -> str:
     """Return the text of the file `name` in the templates of an export."""
     return resources.files("baker.exporters").joinpath("templates", export, name).read_text("utf-8")
@@ -186,6 +213,8 @@ def place_named_scene(bake: Path, target: Path, change: Change | None = None) ->
         node["name"] = unique_name(str(node.get("name", "node")), index)
         extras = node.setdefault("extras", {})
         if isinstance(extras, dict):
+            # The plugin for Bevy finds the last member in the text of the extras, without a JSON parser.
+            extras.pop("baker_node", None)
             extras["baker_node"] = index
     for entry in description["objects"]:
         node = nodes[entry["node"]]

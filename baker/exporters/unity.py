@@ -15,21 +15,16 @@ import math
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from baker.core.encoding import encoding_of
 from baker.core.export import EXPORTS
 from baker.exporters.common import (
     DESCRIPTION_NAME,
     place_named_scene,
     template,
     write_json,
+    write_page,
     write_readme,
     write_text,
 )
-
-# Header attributes of a page that are copied, because they stay valid after the division by pi.
-_KEPT = ("colourSpace", "software")
 
 # Unity ignores folders whose name ends in `~`. Therefore the folders of several bakes can be copied into
 # Assets although all contain the same scripts. The package is installed once, in the project's Packages.
@@ -55,7 +50,14 @@ class UnityExport:
         """Write the files of the export into `target`."""
         description = place_named_scene(bake, target, change=_remove_occlusion)
         for page in description["pages"]:
-            _write_page(bake / page["file"], target / page["file"])
+            write_page(
+                bake,
+                page["file"],
+                target / page["file"],
+                divisor=math.pi,
+                quantity="irradiance E / pi, without the receiver's albedo",
+                unit="cd/m2",
+            )
         write_json(target / DESCRIPTION_NAME, unity_description(description))
         for name in PACKAGE_FILES:
             path = target / PACKAGE / name
@@ -106,14 +108,3 @@ def _remove_occlusion(document: dict[str, Any], description: dict[str, Any]) -> 
 def scale_offset(scale: list[float], offset: list[float]) -> list[float]:
     """Return Unity's lightmapScaleOffset of an object; v = 0 is the bottom of the image in Unity."""
     return [scale[0], scale[1], offset[0], 1.0 - scale[1] - offset[1]]
-
-
-def _write_page(source: Path, target: Path) -> None:
-    """Write a page divided by pi, with the same number format as its source."""
-    encoding = encoding_of(source.name)
-    assert encoding is not None, "the bake wrote this file itself"
-    image = encoding.decode(source)
-    header: dict[str, str] = {key: image.header[key] for key in _KEPT if key in image.header}
-    header |= {"quantity": "irradiance E / pi, without the receiver's albedo", "unit": "cd/m2"}
-    pixels = (image.pixels.astype(np.float64) / math.pi).astype(np.float32)
-    encoding.encode(target, pixels, options=encoding.options_of_image(image), header=header)

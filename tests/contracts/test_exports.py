@@ -17,12 +17,14 @@ from gltf_builder import QUAD, QUAD_NORMAL, QUAD_TRIANGLE, GltfBuilder, write
 
 from baker.channels.channel import make_lightmap
 from baker.core.atlas import Atlas, InstanceLayout
+from baker.core.encoding import ENCODINGS
 from baker.core.errors import SettingsError
 from baker.core.export import EXPORTS, check_exports
 from baker.core.lightmap import BakeResult
 from baker.core.settings import make_settings
 from baker.encodings.exr import decode_exr
 from baker.encodings.hdr import HdrEncoding
+from baker.exporters.bevy import ev100
 from baker.exporters.common import template, unique_name
 from baker.exporters.unity import scale_offset
 from baker.io.bake.write_bake import write_bake
@@ -275,14 +277,44 @@ def test_unreal_reads_uv_1_and_divides_by_pi():
 
 def test_bevy_rectangles_are_offset_and_offset_plus_scale(bake):
     source = (bake[0] / "bevy" / "baker_lightmaps.rs").read_text("utf-8")
-    rows = re.findall(r'Baked \{ name: "(\w+)", page: (\d), min: \[(.*?)\], max: \[(.*?)\] \}', source)
-    assert [(name, int(page)) for name, page, _, _ in rows] == [
-        (unique_name(name or "node", i) if name else f"node_n{i}", i % 2) for i, name in enumerate(NODES)
+    row = r'Baked \{ node: (\d+), name: "(\w+)", page: (\d), min: \[(.*?)\], max: \[(.*?)\] \}'
+    rows = re.findall(row, source)
+    assert [(int(node), name, int(page)) for node, name, page, _, _ in rows] == [
+        (i, unique_name(name, i), i % 2) for i, name in enumerate(NODES)
     ]
-    assert {(low, high) for _, _, low, high in rows} == {("0.0, 0.0", "1.0, 1.0")}
-    assert source.count('    "irradiance_') == 2
-    assert "FRAC_1_PI" in source
+    assert {(low, high) for *_, low, high in rows} == {("0.0, 0.0", "1.0, 1.0")}
+    assert re.findall(r'^    "(.+)",$', source, re.MULTILINE) == ["irradiance_0.ktx2", "irradiance_1.ktx2"]
+    assert "PAGE_SCALE: f32 = 1.0;" in source
     assert "/*" not in source
+
+
+def test_bevy_pages_hold_the_irradiance(bake):
+    for page in range(2):
+        light = decode_exr(bake[0] / f"irradiance_{page}.exr").pixels
+        path = bake[0] / "bevy" / f"irradiance_{page}.ktx2"
+        image = ENCODINGS.require("ktx2", "encoding").decode(path)
+        assert (np.abs(image.pixels - light) <= light.max(axis=2, keepdims=True) / 511.5).all()
+        assert image.header["unit"] == "lx"
+
+
+def test_bevy_pages_above_the_limit_of_their_format_are_scaled_down(tmp_path):
+    made = result(tmp_path / "in", export=("bevy",), dtype="float")
+    light = made.lightmaps["irradiance"].value * 5000.0
+    write_bake(replace(made, lightmaps={"irradiance": make_lightmap("irradiance", light)}), tmp_path / "out")
+    folder = tmp_path / "out" / "bevy"
+    assert light.max() > 2 * 65408.0
+    assert "PAGE_SCALE: f32 = 4.0;" in (folder / "baker_lightmaps.rs").read_text("utf-8")
+    assert json.loads((folder / "lightmap.json").read_text("utf-8"))["scale"] == 4.0
+    assert "E in lx = page x 4;" in (folder / "README.md").read_text("utf-8")
+    image = ENCODINGS.require("ktx2", "encoding").decode(folder / "irradiance_0.ktx2")
+    assert image.pixels.max() * 4.0 == pytest.approx(light[0].max(), rel=0.002)
+
+
+def test_bevy_exposure_values():
+    """A Bevy camera multiplies by 1 / (1.2 x 2^EV100)."""
+    for exposure in (1e-4, 0.0625, 1.0, 30.0):
+        assert 2.0 ** -ev100(exposure) / 1.2 == pytest.approx(exposure, rel=1e-3)
+    assert ev100(None) == 9.7
 
 
 def test_godot_shaders_read_uv2_and_divide_by_pi():

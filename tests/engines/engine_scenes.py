@@ -81,13 +81,20 @@ def probe_builder(alpha: str = "OPAQUE") -> GltfBuilder:
     return builder
 
 
-def write_probe(folder: Path, exports: str, *, page: np.ndarray | None = None, **settings: object) -> Path:
+def write_probe(
+    folder: Path,
+    exports: str,
+    *,
+    page: np.ndarray | None = None,
+    builder: GltfBuilder | None = None,
+    **settings: object,
+) -> Path:
     """Write the probe as a bake with these exports and return the output folder.
 
-    The distant square is on the second page, which is black.
+    The distant square is on the second page, which is black. `builder` may have more nodes without meshes.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    scene = load_scene(write(folder / "probe.glb", probe_builder()))
+    scene = load_scene(write(folder / "probe.glb", builder or probe_builder()))
     layouts = tuple(_whole(scene, index) for index in range(2))
     light = np.stack([probe_page() if page is None else page, np.zeros((SIZE, SIZE, 3), np.float32)])
     result = BakeResult(
