@@ -36,7 +36,7 @@ def choose_objects(scene: Scene, include: Sequence[str], exclude: Sequence[str])
     Raises
     ------
     InputError
-        If no object is left.
+        If the scene has objects and the patterns select none of them.
     """
     if not include and not exclude:
         return scene

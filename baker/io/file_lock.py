@@ -22,7 +22,7 @@ def try_lock(file: int) -> bool:
     Raises
     ------
     OSError
-        If the file system does not support locks.
+        If the file system does not support locks (POSIX only; on Windows, False is returned).
     """
     try:
         import fcntl

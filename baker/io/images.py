@@ -28,8 +28,8 @@ _STRIP = 32
 def decode_image(data: bytes, *, file: str, object: str) -> NDArray[np.uint8]:
     """Return an image's pixels as they are stored: sRGB-encoded colour, linear alpha, row 0 at the top.
 
-    If the width or height exceeds 8192 texels, the image is halved: each block of 2 x 2 texels is averaged in
-    linear light. An odd last row or column is dropped.
+    If the width or height exceeds 8192 texels and the other is above 1, the image is halved: each block of
+    2 x 2 texels is averaged in linear light. An odd last row or column is dropped.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def decode_image(data: bytes, *, file: str, object: str) -> NDArray[np.uint8]:
     Returns
     -------
     (H, W, 4) uint8
-        RGBA, 0 to 255; 16-bit images are rounded to 8 bits.
+        RGBA, 0 to 255; 16-bit grey is rounded to 8 bits.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def decode_image(data: bytes, *, file: str, object: str) -> NDArray[np.uint8]:
 
 
 def _to_rgba(image: Image) -> NDArray[np.uint8]:
-    """Convert an image to RGBA in strips of rows, so that memory holds at most two copies of it."""
+    """Convert an image to RGBA in strips of rows, so that no further copy of the whole image is needed."""
     width, height = image.size
     step = 2 if max(width, height) > LARGEST_IMAGE_SIDE and min(width, height) > 1 else 1
     pixels = np.zeros((height // step, width // step, 4), np.uint8)

@@ -22,12 +22,13 @@ class Case:
     ----------
     name : str
     group : str
-        Value of the attribute `classname`, such as the name of a scene or an object.
+        Value of the attribute `classname`: the path of a scene, an output folder or its name, or "batch".
     problem : str
         Why the case failed; empty if it passed.
     seconds : float
     error : bool
-        True if the check could not run; then `problem` is written as an error and not as a failure.
+        True if the case failed for lack of a resource; then `problem` is written as an error and not as a
+        failure.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Lists the files that a scene file may refer to, without reading them and without checking the scene."""
+"""Lists the files that a scene file may refer to, without loading the scene."""
 
 from __future__ import annotations
 

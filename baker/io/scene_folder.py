@@ -19,7 +19,10 @@ class OutsideError(InputError):
 
 
 class OutsideName(Exception):  # noqa: N818 - a reason, which becomes an OutsideError with file and object
-    """A file name refers to a file outside the folder of the scene; the message is the reason."""
+    """Raised if a file name leads outside the folder of the scene.
+
+    The message continues a sentence about the file: "is outside of the scene's folder; ...".
+    """
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,9 @@ class SceneFolder:
             If the file, after resolving symbolic links, is not inside the folder of the scene. The error is
             the same whether the file exists or not.
         OSError
-            If the file is missing, unreadable, not a regular file, too long, or a Git LFS pointer.
+            If the file is missing, unreadable, not a regular file, a Git LFS pointer, or longer than
+            `LARGEST_PART` bytes. With `first`, if more than `LARGEST` bytes would be read. Always if
+            `self_contained` is True.
         ValueError
             If no file can have this name.
         """

@@ -31,8 +31,8 @@ def scene_sha256(path: Path, *, allow_outside: bool = False) -> str:
     Raises
     ------
     InputError
-        If the file or a file that it refers to is missing, unreadable, malformed or outside the folder of the
-        scene.
+        If the file is missing, unreadable or malformed, or refers to a file outside the folder of the scene.
+        For an OBJ file, also if an image of a used material is missing.
     """
     folder = SceneFolder(path.parent, allow_outside)
     suffix = path.suffix.lower()

@@ -102,7 +102,7 @@ def temporary_path(out: Path, *, inside: bool = False) -> Path:
 
 
 def temporaries(out: Path) -> list[Temporary]:
-    """List the temporary folders that any process has left for an output.
+    """List the temporary folders of all processes for an output.
 
     Parameters
     ----------
@@ -112,7 +112,8 @@ def temporaries(out: Path) -> list[Temporary]:
     Returns
     -------
     list of Temporary
-        Sorted by name; empty if the parent folder cannot be listed.
+        The folders beside the output, then those inside it, each sorted by name. A folder that cannot be
+        listed is skipped.
     """
     target = Path(os.path.realpath(out))
     found = []
@@ -138,7 +139,8 @@ def claim(found: Temporary) -> Iterator[bool]:
     Yields
     ------
     bool
-        True if the process has ended; then the folder is locked until the `with` block ends.
+        True if the process has ended. The folder is then locked until the `with` block ends, if the file
+        system supports locks.
     """
     try:
         file = os.open(found.path, os.O_RDONLY)

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
-# Let high and low be the largest and the smallest value of the covered neighbours. A dilated value is wrong
-# if it is above `_FACTOR` high + s or below low / `_FACTOR` - s. s is `_SLACK` times the mean of the page.
+# Values are means over colours. Let high and low be the largest and the smallest value of the covered
+# neighbours. A dilated value is wrong if it is above `_FACTOR` high + s or below low / `_FACTOR` - s. s is
+# `_SLACK` times the mean of the page's covered texels.
 _FACTOR = 4.0
 _SLACK = 0.02
 

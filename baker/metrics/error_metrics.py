@@ -5,16 +5,16 @@ colours. Means and medians are over all points, unless stated otherwise:
 
     relative error   |v - r| / max(r, floor)          floor = max(0.1 median(r), 0.01 mean(r))
     bias             mean(v - r) / mean(r)
-    rmse             sqrt(mean (v_c - r_c)^2)         over points and colours, in the channel's unit
+    rmse             sqrt(mean((v_c - r_c)^2))        over points and colours, in the channel's unit
     nrmse            rmse / mean(r)
-    relmse           mean (v - r)^2 / (r^2 + 0.01 mean(r)^2)
+    relmse           mean((v - r)^2 / (r^2 + 0.01 mean(r)^2))
     z                (v_c - r_c) / standard error of r_c
     colour error     |v_c - r_c| / max(r_c, 0.1 r, floor)
     energy ratio     R = sum w v / sum w r            w: surface area, m2, that a point represents
     std. error of R  sqrt(sum w^2 (v - R r)^2) / sum w r
 
 `median`, `p95`, `p99` and `max` are statistics of the relative error. Without the floor in the denominator,
-dark points would dominate them.
+dark points would dominate them. `z_rms` is the root mean square of z over points and colours.
 
 `colour_median` and `colour_p95` are the median and the 95th percentile of the colour error. Both are computed
 for each colour, and the largest values are returned. A mean over colours would not detect that red and blue
@@ -89,7 +89,7 @@ def dark_floor(reference: NDArray[np.float64]) -> float:
     Returns
     -------
     float
-        In the unit of the channel; 0 if all are black.
+        In the unit of the channel; 0 without points, or if all are black.
     """
     mean = reference.mean(axis=1)
     if not len(mean):

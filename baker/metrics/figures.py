@@ -30,7 +30,7 @@ class Figure(NamedTuple):
     kind: str
 
 
-# Kinds of groups, and how a phrase names the worst one.
+# Kind of group -> how a phrase names the group whose value is reported.
 _GROUPS = {
     "whole": "all texels together",
     "region": "the worst room or light level of a room",
@@ -134,7 +134,7 @@ FIGURES: dict[str, Figure] = {**_WHOLE, **_OF_GROUPS, **_EDGES, **_FAULTS, **_UN
 
 
 def figure_text(name: str, value: Any) -> str:
-    """Return the value of a metric as text, with three significant digits.
+    """Return the value of a metric as text.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def figure_text(name: str, value: Any) -> str:
 
 
 def limit_text(name: str, operator: str, limit: float) -> str:
-    """Return a limit on a metric as text, such as "> 1.5%"."""
+    """Return a limit on a metric as text, such as "> 1.5%"; "yes" if a yes-no metric must not be true."""
     if _kind(name) == YES_NO and operator == ">" and limit == 0:
         return "yes"
     shown = percent(limit) if _kind(name) in (SHARE, SIGNED) else f"{limit:g}"

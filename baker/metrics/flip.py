@@ -32,7 +32,7 @@ def flip_error(
     import flip_evaluator
 
     if float(reference.max(initial=0.0)) <= 0.0:
-        # HDR-FLIP cannot choose an exposure for a black reference.
+        # HDR-FLIP cannot choose an exposure for a black reference. Return 0 if `picture` is black, else 1.
         same = bool((picture <= 0).all())
         return np.full(reference.shape[:2], 0.0 if same else 1.0, np.float32), 0.0 if same else 1.0
     first, second = (

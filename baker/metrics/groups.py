@@ -30,9 +30,9 @@ If the rms noise of a group's reference exceeds the share `_UNRELIABLE` of the g
 bound of the own error is set to 0. The reason is that the light of rare paths is then missing at most points,
 and too strong at a few points.
 
-The bright light of a scene is the 95th percentile of its reference values. If the summed reference of a group
-is less than three times the standard error of this sum, differences are relative to at least a thousandth of
-the bright light. The standard error then includes one missed path that carries the bright light.
+The bright light of a scene is the 95th percentile of its reference values r. If the summed reference of a
+group is at most three times the standard error of this sum, differences are relative to at least a thousandth
+of the bright light. The standard error then includes one missed path that carries the bright light.
 
 Based on: Cochran, Sampling Techniques, 1977, chapter 6; Efron, The jackknife, the bootstrap and other
 resampling plans, 1982.
@@ -151,7 +151,10 @@ class GroupMetrics:
         return self.spread.lower
 
     def _sure(self, deviation: NDArray[np.float64], error: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return deviations with absolute values reduced by `z_needed` standard errors, not below 0."""
+        """Return deviations with absolute values reduced by `z_needed` standard errors, not below 0.
+
+        All are 0 if the group has fewer than `MIN_POINTS` effective points.
+        """
         if self.effective < MIN_POINTS:
             return np.zeros_like(deviation)
         left = np.maximum(np.abs(deviation) - z_needed(self.effective) * error, 0.0)
@@ -250,7 +253,10 @@ def compare_group(points: ComparedPoints, bright: float, min_light: float = 0.0)
 
 
 def _colour_shift(points: ComparedPoints) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the relative shift of each colour's share of the light (C,), and its standard errors (C,)."""
+    """Return the relative shift of each colour's share of the light (C,), and its standard errors (C,).
+
+    Both are 0 for a channel of one component, or if a sum of the light is black.
+    """
     v, r = points.value.mean(axis=1), points.reference.mean(axis=1)
     all_sums = [a.sum(axis=0) for a in (points.value, points.reference, *points.halves)]
     if points.value.shape[1] == 1 or not all(a.mean() > 0 for a in all_sums):

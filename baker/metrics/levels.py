@@ -75,8 +75,8 @@ def cut_off(
     Returns
     -------
     float
-        Mean reference / largest value - 1, the maximum over components. 0 if fewer than eight compared texels
-        have the largest value.
+        Mean reference / largest value - 1, the maximum over components, at least 0. Components whose largest
+        value occurs at fewer than eight compared texels are skipped.
     """
     worst = 0.0
     for c in range(maps.shape[3]):

@@ -37,7 +37,7 @@ class OutputLock:
         Raises
         ------
         OSError
-            If the lock file cannot be created.
+            If the lock file or its folder cannot be created, or if the file system does not support locks.
         """
         for parent in reversed([p for p in self.path.parents if not p.exists()]):
             with contextlib.suppress(FileExistsError):
@@ -59,7 +59,7 @@ class OutputLock:
         return False
 
     def release(self) -> None:
-        """Release the lock; delete the lock file and those parent folders that `acquire` created."""
+        """Release the lock. Delete the lock file, and the empty parent folders that `acquire` created."""
         if self._file is None:
             return
         # Delete the file before the release, because another run could lock the file after the release.
@@ -78,8 +78,8 @@ class OutputLock:
 def held(out: Path) -> Iterator[None]:
     """Hold the lock of an output folder within a `with` block, without waiting for other runs.
 
-    If no lock file can be created beside the output folder, the `with` block runs without a lock. An example
-    is a mount point in a folder that is not writable.
+    If the lock file cannot be created, or if the file system does not support locks, the `with` block runs
+    without a lock. For example, the folder around a mount point may not be writable.
 
     Parameters
     ----------

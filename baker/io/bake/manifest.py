@@ -1,6 +1,7 @@
 """Builds `bake.json`, the manifest of a bake: its files, the page of each object, settings and versions.
 
-Repeating a bake gives an equal manifest, except for `created` and `timings`.
+Repeating a bake with the same library versions and the same folders gives an equal manifest, except for
+`created` and `timings`.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 # Version of the manifest's layout; it changes when the name or the meaning of a key changes.
 VERSION = 1
 
-# Key in `versions` of the manifest -> installed distribution, for libraries that can change texel values.
+# Key in `versions` of the manifest -> installed distribution, for libraries that can change the output.
 _LIBRARIES = {
     "embree": "embreex", "xatlas": "xatlas", "numba": "numba", "numpy": "numpy",
     "scipy": "scipy", "openimagedenoise": "pyoidn", "openexr": "OpenEXR", "pillow": "Pillow",
@@ -136,7 +137,7 @@ def resolved_settings(settings: BakeSettings) -> dict[str, Any]:
 
 
 def _channel(lightmap: Lightmap) -> dict[str, Any]:
-    """Return unit, quantity, components and definition of a channel."""
+    """Return the manifest entry of a channel: unit, quantity, components, signedness and definition."""
     keys = ("unit", "quantity", "components", "signed", "definition")
     return {key: getattr(lightmap.description, key) for key in keys}
 
@@ -160,7 +161,7 @@ def _diagonal(result: BakeResult) -> float:
 
 
 def library_versions() -> dict[str, str | None]:
-    """Return the versions of baker, Python and the libraries that can change the numbers of a bake.
+    """Return the versions of baker, Python and the libraries that can change the output of a bake.
 
     Returns
     -------
@@ -207,7 +208,7 @@ def _instances(result: BakeResult, instance_mesh: tuple[int, ...]) -> list[dict[
 
 
 def _lights(result: BakeResult) -> list[dict[str, Any]]:
-    """List the punctual lights, the emissive materials of the scene's instances, and the sky."""
+    """List the punctual lights, the materials in use that emit light, and the sky if it is not black."""
     lights: list[dict[str, Any]] = []
     for light in result.scene.lights:
         kind = kind_of(light)
@@ -229,7 +230,7 @@ def _lights(result: BakeResult) -> list[dict[str, Any]]:
 
 
 def _statistics(result: BakeResult, channel: str) -> dict[str, Any]:
-    """Return a channel's entry of `result.statistics`, or compute it from the covered texels."""
+    """Return a channel's entry of `result.statistics`, or compute it without the empty and dilated texels."""
     if channel in result.statistics:
         return result.statistics[channel]
     covered = np.isin(result.status, (1, 3, 4))
@@ -253,7 +254,7 @@ def _warnings(result: BakeResult, more: tuple[SceneWarning, ...]) -> list[dict[s
 
 
 def _plain(value: Any) -> Any:
-    """Return `value` in plain JSON types; numbers that are not finite become null."""
+    """Return `value` in plain JSON types: numbers that are not finite become null, other objects strings."""
     if isinstance(value, dict):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""Finds folders that cannot be renamed."""
+"""Finds folders that cannot or must not be renamed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _MOUNT_TABLE = Path("/proc/self/mountinfo")
 
 
 def cannot_move(folder: Path) -> bool:
-    """Return whether a folder cannot be renamed.
+    """Return whether a folder cannot or must not be renamed.
 
     True is returned for
 
@@ -26,7 +26,7 @@ def cannot_move(folder: Path) -> bool:
     Returns
     -------
     bool
-        True if the folder cannot be renamed.
+        True if the folder must not be renamed.
     """
     if os.path.ismount(folder) or not os.access(folder.parent, os.W_OK | os.X_OK):
         return True

@@ -2,8 +2,9 @@
 
 All files are written to a temporary folder beside the output folder. At the end, the file system exchanges
 the two folders in one atomic step. In two cases the files are moved one by one instead: if the output folder
-cannot be renamed (see `baker.io.bake.mounts`), or if the file system does not support the exchange. A journal
-records these moves. If the process is killed before the last move, `baker.io.bake.recovery` undoes the moves.
+cannot be renamed (see `baker.io.bake.mounts`), or if the file system does not support the exchange. In the
+first case, the temporary folder is inside the output folder. A journal records these moves. If the process is
+killed before the last move, `baker.io.bake.recovery` undoes the moves.
 """
 
 from __future__ import annotations
@@ -37,15 +38,16 @@ def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None)
     out : Path
         The output folder; neither it nor its parents need to exist.
     force : bool
-        Accept a folder with files that baker did not write (they are kept).
+        Accept a folder that contains files but no bake. These files are kept, unless the bake writes a file
+        of the same name.
     scene_path : Path or None
         The input scene file; it is an error if the bake would replace it.
 
     Raises
     ------
     SettingsError
-        If `out` is a file or a name that no folder can have. If `out` contains files that baker did not write
-        and `force` is False. If the bake would replace the input.
+        If `out` is the root, a file, inside a file, or a path that `resolved_output` refuses. If `out`
+        contains files but no bake, and `force` is False. If the bake would replace the input.
     ResourceError
         If the folder cannot be read or written to.
     """
@@ -76,7 +78,7 @@ def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None)
 
 
 def own_files(folder: Path) -> set[str] | None:
-    """Return the files that the manifest in a folder lists, and the manifest itself.
+    """Return the paths of the manifest in a folder and of the files that the manifest lists.
 
     Parameters
     ----------
@@ -86,8 +88,8 @@ def own_files(folder: Path) -> set[str] | None:
     Returns
     -------
     set of str or None
-        Paths relative to the folder. None if the folder has no manifest of baker, or if the manifest names a
-        file outside the folder, by its path or through a symbolic link.
+        Paths relative to the folder. None if the folder has no readable manifest of baker, or if
+        `lies_inside` refuses one of the paths.
     """
     try:
         manifest = json.loads(read_regular(folder / MANIFEST_NAME))
@@ -175,12 +177,14 @@ class OutputFolder:
         self.abort()
 
     def commit(self) -> None:
-        """Replace the old files by the new ones; files that baker did not write are kept.
+        """Replace the old files by the new ones.
+
+        Files that baker did not write are kept, unless a new file has the same name.
 
         Raises
         ------
         OSError
-            If a file cannot be moved; the old files are then restored.
+            If a file cannot be copied or moved; the old files are then restored.
         """
         try:
             if not self.out.exists():
@@ -194,7 +198,7 @@ class OutputFolder:
         self._home.remove()
 
     def abort(self) -> None:
-        """Restore the old folder, and remove all temporary files."""
+        """Restore the old files, and remove all temporary files and the parent folders that were created."""
         try:
             undo(self._home.path, self.out)
         except OSError:
@@ -221,7 +225,7 @@ class OutputFolder:
 
 
 def _check_writable(folder: Path, parent: Path, out: Path) -> None:
-    """Raise if the temporary folder of a bake cannot be created; `parent` exists and contains `folder`."""
+    """Raise if the temporary folder of a bake cannot be created; `parent` is the nearest existing parent."""
     where = folder if folder.is_dir() else parent
     probe = TemporaryFolder(parent / folder.name)
     try:
@@ -238,7 +242,7 @@ def _check_writable(folder: Path, parent: Path, out: Path) -> None:
 
 
 def _carry_over(old: Path, new: Path, own: set[str], prefix: str = "") -> None:
-    """Hard-link or copy all files that are not in `own` from the folder `old` to the folder `new`."""
+    """Hard-link or copy files from `old` to `new`, except those in `own` and those that `new` has already."""
     for entry in sorted(os.scandir(old), key=lambda e: e.name):
         name, target = prefix + entry.name, new / entry.name
         is_folder = entry.is_dir(follow_symlinks=False)

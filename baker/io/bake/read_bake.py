@@ -33,18 +33,19 @@ class StoredBake:
     Attributes
     ----------
     folder : Path
+        The output folder.
     manifest : dict
         The content of `bake.json`.
     scene : Scene
-        The content of `scene.glb`; the sky is in `manifest["settings"]`.
+        The objects of `scene.glb` that were baked; the sky is in `manifest["settings"]`.
     atlas : Atlas
-        The lightmap uv are TEXCOORD_1 of `scene.glb`; the page numbers are from the manifest. All triangles
-        of an instance form one chart, whose number is the index of the instance.
+        The lightmap uv are `TEXCOORD_1 x uv_scale + uv_offset`. Page numbers are from the manifest. All
+        triangles of an instance form one chart, whose number is the index of the instance.
     maps : dict of str to (P, H, W, C) float32
         For each channel, P pages of H x W texels with C components.
     status : (P, H, W) uint8, `baker.core.lightmap.TexelStatus`
     warnings : tuple of SceneWarning
-        One warning for each file that changed or disappeared since the bake.
+        One warning for each file of the manifest that changed or disappeared since the bake.
     """
 
     folder: Path

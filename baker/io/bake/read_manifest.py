@@ -26,7 +26,7 @@ _SHORT = 60
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Return the manifest of an output folder, after `recover` has undone writes of killed processes.
+    """Return the manifest of an output folder. First, `recover` undoes incomplete writes of killed processes.
 
     Parameters
     ----------
@@ -36,8 +36,10 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        The manifest, valid by the schema. All page numbers exist. No node and no file occurs twice. Every
-        file name is a path inside the folder. The numbers of instances, timings and rays are finite.
+        The manifest, valid by the schema. Each channel has the pages 0 to n - 1, each once, and the page of
+        every instance is one of them. All pages are squares of one size. No two instances have the same node,
+        and no file is listed twice. Every file name is a path inside the folder. The numbers of instances,
+        timings and rays are finite.
 
     Raises
     ------
@@ -69,7 +71,7 @@ def _no_number(name: str) -> NoReturn:
 
 
 def _check_schema(manifest: dict[str, Any]) -> None:
-    """Raise ValueError for the first violation of the schema."""
+    """Raise ValueError if the manifest violates the schema; the message names one violation."""
     # Import here, because importing `jsonschema` is slow and most runs read no manifest.
     from jsonschema import Draft202012Validator
     from jsonschema.exceptions import best_match

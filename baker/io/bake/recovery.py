@@ -1,9 +1,9 @@
 """Exchanges the files of an output folder one by one, and undoes an exchange that was interrupted.
 
-Folders that cannot be renamed are replaced in this way. Before the first file is moved, the exchange is
-recorded in a journal beside the new files. The new manifest is moved last. If the process is killed before
-the move of the manifest, `recover` in a later command restores the old files. After this move, the new bake
-is complete.
+Output folders that cannot be exchanged as a whole are replaced in this way. Before the first file is moved,
+the exchange is recorded in a journal in the temporary folder. The new manifest is moved last. If the process
+is killed before the move of the manifest, `recover` in a later command restores the old files. After this
+move, the new bake is complete.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _FILE_NAME = re.compile(r"(?!\.{1,2}(/|$))[^/\\:]+(/(?!\.{1,2}(/|$))[^/\\:]+)*")
 
 
 def lies_inside(folder: Path, name: object) -> bool:
-    """Return whether `name` is a path inside `folder` and none of its parent folders is a symbolic link.
+    """Return whether `name` is a printable path in `folder` and no parent folder in it is a symbolic link.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def lies_inside(folder: Path, name: object) -> bool:
 
 
 def exchange_files(home: Path, out: Path, old: Collection[str], new: Collection[str]) -> None:
-    """Replace the files `old` of an output folder by the files `new`, one by one.
+    """Replace the files `old` of an output folder, and files named like a new file, by the files `new`.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def exchange_files(home: Path, out: Path, old: Collection[str], new: Collection[
     Raises
     ------
     OSError
-        If a file cannot be moved. The caller then calls `undo`.
+        If a file cannot be moved, or a folder has the name of a file. The caller then calls `undo`.
     """
     leaving = [name for name in _manifest_first({*old, *new}) if os.path.lexists(out / name)]
     for name in leaving:
@@ -96,7 +96,7 @@ def undo(home: Path, out: Path) -> None:
     Raises
     ------
     OSError
-        If a file cannot be moved back; call `undo` again later.
+        If a file cannot be moved back (call `undo` again later), or if the journal is damaged.
     """
     journal = _journal(home, out)
     new = journal["new"]
@@ -119,8 +119,8 @@ def undo(home: Path, out: Path) -> None:
 def recover(out: Path) -> None:
     """Undo the incomplete exchanges of killed processes for an output, and remove their temporary folders.
 
-    Every command that reads or writes an output folder calls `recover` first. If files cannot be moved or
-    removed, they are left as they are, without an error.
+    Every command that reads or writes an output folder calls `recover` first. A lock file that no process
+    holds is removed as well. If files cannot be moved or removed, they are left unchanged, without an error.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def abandoned(out: Path) -> bool:
     Returns
     -------
     bool
-        True until `recover` has removed all folders that killed processes have left.
+        True if such a folder exists.
     """
     for found in temporaries(out):
         with claim(found) as free:

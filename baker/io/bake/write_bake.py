@@ -23,8 +23,8 @@ from baker.io.png import encode_palette_png, encode_png, grey_levels
 
 __all__ = ["check_out", "write_bake"]
 
-# Palette colours of `status_<page>.png`, 8-bit sRGB. They differ in luminance and remain distinguishable with
-# red-green colour blindness.
+# Palette colours of `status_<page>.png`, 8-bit sRGB. COVERED and INVALID differ in hue only, the others
+# also in luminance. All remain distinguishable with red-green colour blindness.
 STATUS_COLOURS = {
     TexelStatus.EMPTY: (16, 16, 16),
     TexelStatus.COVERED: (86, 180, 233),
@@ -33,8 +33,8 @@ STATUS_COLOURS = {
     TexelStatus.UNCONVERGED: (240, 228, 66),
 }
 
-# Share of a page's surface texels, 0 to 1. If a larger share is banded, see `baker.core.encoding.Loss`, a
-# warning is given.
+# Share of a page's texels that are not empty, 0 to 1. If a larger share is banded (see
+# `baker.core.encoding.Loss`), there is a warning.
 BANDED_SHARE = 0.01
 
 
@@ -53,11 +53,13 @@ def write_bake(
     result : BakeResult
         The bake.
     out : Path
-        The output folder. A bake there is replaced; files that baker did not write are kept.
+        The output folder. A bake there is replaced. Other files are kept, unless a new file has the same
+        name.
     force : bool
-        Also write into a folder with files that baker did not write.
+        Also write into a folder that contains files but no bake.
     progress : Progress
-        Called with stage, fraction and file name after each file; a truthy return value cancels.
+        Called with stage, fraction and a name: after each page, each status image and `scene.glb` with the
+        name of the file, and before each export. A truthy return value cancels.
     created : datetime or None
         Time to write into the manifest; None uses the current time.
 
@@ -69,9 +71,9 @@ def write_bake(
     Raises
     ------
     SettingsError
-        If `check_out` refuses `out`.
+        If `check_out` refuses `out`, or if a name of an encoding or export is unknown.
     ResourceError
-        If the disk is full or not writable; the folder is unchanged.
+        If the disk is full or not writable; the folder is unchanged. If `scene.glb` would be too large.
     Cancelled
         If `progress` returned a truthy value; the folder is unchanged.
     """
@@ -156,7 +158,10 @@ def _write_export(folder: Path, name: str) -> list[dict[str, Any]]:
 def _write_page(
     result: BakeResult, lightmap: Lightmap, page: int, folder: Path
 ) -> tuple[dict[str, Any], list[SceneWarning]]:
-    """Write one page of a channel in all chosen formats; return its manifest entry and the loss warnings."""
+    """Write one page of a channel as EXR and in each chosen format that can store the channel.
+
+    Return the manifest entry of the page, and the warnings about losses.
+    """
     value, described = lightmap.value[page], lightmap.description
     height, width, _ = value.shape
     header = {
@@ -219,7 +224,7 @@ def encoding_named(name: str) -> Encoding[Any]:
 
 
 def why_unfit(name: str, channel: ChannelDescription) -> str | None:
-    """Return why an encoding cannot hold a channel, as the end of a sentence; None if it can."""
+    """Return why an encoding cannot store a channel, such as "holds no negative numbers"; None if it can."""
     encoding = ENCODINGS.require(name, "encoding")
     n = len(channel.components)
     if n not in encoding.components:
@@ -238,8 +243,8 @@ def check_encodings(names: tuple[str, ...], channels: Mapping[str, ChannelDescri
     ----------
     names : tuple of str
         Names of encodings.
-    channels : mapping of channel to its description
-        The channels of the bake.
+    channels : mapping of str to ChannelDescription
+        The channels of the bake, by name.
 
     Raises
     ------

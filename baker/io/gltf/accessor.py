@@ -1,4 +1,4 @@
-"""Reads glTF accessors into arrays: also strided, normalised and sparse ones, and ones without a buffer view.
+"""Reads glTF accessors into arrays, including strided, normalised and sparse ones and those without a view.
 
 Based on: Khronos Group, glTF 2.0 Specification, section 3.6.2.
 """
@@ -41,11 +41,11 @@ def read_accessor(document: GltfDocument, index: int, *, types: tuple[str, ...])
     Raises
     ------
     InputError
-        If the element type is not allowed, or the data lies outside its buffer view.
+        If the accessor is malformed, its element type is not in `types`, or its data exceeds its buffer view.
     """
     accessor = document.root.children("accessors")[index]
     raw = _rows(document, accessor, types)
-    # Adding 0 turns signalling NaNs, which raise warnings in later casts, into quiet ones.
+    # Adding -0.0 turns signalling NaNs, which raise warnings in later casts, into quiet ones.
     with np.errstate(invalid="ignore"):
         value: NDArray[np.float32] = raw.astype(np.float32) + np.float32(-0.0)
     if accessor.boolean("normalized", False) and raw.dtype.kind in "iu":

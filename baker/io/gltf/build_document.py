@@ -1,4 +1,4 @@
-"""Builds a glTF document for a scene that was not read from glTF.
+"""Builds a glTF document from a `Scene` alone, without a source document.
 
 The nodes are the instances, sorted by `Instance.node`, followed by the lights. Each node is a root, so its
 matrix is its world matrix. Colour factors are linear, and textures are embedded as PNG.
@@ -87,9 +87,9 @@ def new_document(scene: Scene, atlas: Atlas) -> tuple[Packer, list[BakedUse], li
 
 
 def scene_name(scene: Scene) -> Json:
-    """Return the glTF key `name` of a scene, or no key if the scene was read and is named after its file.
+    """Return the name of a scene as glTF JSON, or {} if the scene was read from a file.
 
-    A renamed file therefore gives the same bytes.
+    A scene that was read has the name of its file. Without the name, a renamed file gives the same bytes.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def scene_name(scene: Scene) -> Json:
     Returns
     -------
     dict
-        The key and the name, or nothing.
+        `{"name": ...}` or {}.
     """
     return {"name": scene.name} if scene.path is None else {}
 
@@ -109,7 +109,7 @@ def _mirrors(instance: Instance) -> bool:
 
 
 def _node(instance: Instance, mesh: Mesh) -> tuple[Json, Mesh]:
-    """Return an instance's node and mesh; if the node would need shear, the mesh is moved to world space."""
+    """Return an instance's node and mesh; if the matrix has shear, the mesh is moved to world space."""
     matrix = np.asarray(instance.world_from_object, np.float64)
     if np.array_equal(matrix, np.eye(4)):
         return {"name": instance.name}, mesh
@@ -176,7 +176,7 @@ def material_json(packer: Packer, material: Material, images: dict[int, int], ex
     if material.base_colour_texture is not None:
         surface["baseColorTexture"] = _texture(packer, material.base_colour_texture, images, extensions)
     if any(material.emission):
-        # `emissiveFactor` is at most 1: divide by the largest component, and write that as strength.
+        # The components of `emissiveFactor` are at most 1. Divide by the largest one if it is above 1.
         strength = max(1.0, *map(float, material.emission))
         result["emissiveFactor"] = [max(float(v), 0.0) / strength for v in material.emission]
         if strength > 1.0:

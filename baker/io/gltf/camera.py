@@ -16,7 +16,9 @@ from baker.io.gltf.node import Placed
 
 
 def read_cameras(placed: list[Placed], document: GltfDocument, warnings: list[SceneWarning]) -> list[Camera]:
-    """Return the perspective cameras of the scene, in the order of the nodes; other cameras are left out.
+    """Return the perspective cameras of the scene, in the order of the nodes.
+
+    Orthographic cameras, and cameras whose node is scaled by 0, are left out.
 
     Parameters
     ----------

@@ -49,7 +49,7 @@ def split_glb(data: bytes, file: str) -> Chunks:
     Raises
     ------
     InputError
-        If the version is not 2, or a chunk is truncated, missing or in the wrong order.
+        If the header or a chunk is truncated, the version is not 2, or the first chunk is not JSON.
     """
 
     def fail(message: str) -> NoReturn:

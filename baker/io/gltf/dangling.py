@@ -17,10 +17,11 @@ NOWHERE = 2**31 - 1
 
 
 def break_dangling(document: Json, buffers: tuple[bytes, ...], missing: frozenset[int]) -> None:
-    """Replace invalid indices of accessors, views and buffers by `NOWHERE`.
+    """Replace invalid references to accessors, views and buffers by `NOWHERE`.
 
-    An index is invalid if the list has no such object, or if the object exceeds its data: a view its buffer,
-    or an accessor its view. In extensions, only indices of views with the key `bufferView` are replaced.
+    A reference is invalid if the list has no such object. The buffer of a view is also invalid if the view
+    exceeds it, and the view of an accessor if the accessor exceeds it. In extensions, only the members
+    `bufferView`, and `buffer` in extensions of views, are replaced.
 
     Parameters
     ----------
@@ -79,7 +80,7 @@ def _parts(accessor: Json, views: dict[int, Json]) -> Iterator[tuple[Json, bool]
         if not isinstance(holder, dict) or not is_index(holder.get("bufferView")):
             continue
         view = views.get(holder["bufferView"], {})
-        # Only indices of sparse values have a type of their own.
+        # Sparse indices have a `componentType`; sparse values have the type of the accessor.
         typed = holder if "componentType" in holder else accessor
         try:
             size = element_size({"type": "SCALAR", **typed})

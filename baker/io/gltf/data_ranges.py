@@ -1,4 +1,4 @@
-"""Finds the buffer views and accessors of a glTF document that exceed their data."""
+"""Finds the buffer views and accessors of a glTF document that cannot be read."""
 
 from __future__ import annotations
 

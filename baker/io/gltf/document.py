@@ -1,6 +1,7 @@
 """Opens glTF 2.0 documents: JSON, buffers, and the bytes of external images.
 
-A buffer or image that cannot be read is an error only when its data is needed.
+A buffer or image that cannot be read is an error only when its data is needed. A file outside the folder of
+the scene is always an error.
 
 Based on: Khronos Group, glTF 2.0 Specification, sections 3.2 (asset) and 3.6 (buffers).
 """
@@ -53,7 +54,7 @@ _LISTS = ("accessors", "bufferViews", "materials", "meshes", "nodes", "images", 
 # Ignored extensions that `_check_extensions` does not report, because `material.py` reports them for each
 # material.
 _REPORTED = frozenset({"KHR_materials_transmission"})
-# Largest number of levels of nested JSON objects and lists.
+# Largest depth of nested JSON objects and lists in a top-level member.
 _DEEPEST = 100
 _COMPRESSED_VIEW = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
@@ -76,7 +77,8 @@ class GltfDocument:
     folder : SceneFolder
         Folder that relative URIs refer to.
     sha256 : str
-        SHA-256 of the bytes of the scene file, followed by its external buffers and its external images.
+        SHA-256 of the scene file, followed by the external buffers (at most `byteLength` bytes of each) and
+        the external images.
     warnings : tuple of SceneWarning
     """
 
@@ -96,7 +98,8 @@ class GltfDocument:
         Raises
         ------
         InputError
-            If the view exceeds its buffer, is compressed by an extension, or the buffer cannot be read.
+            If the view exceeds its buffer, its data exists only in compressed form, or the buffer cannot be
+            read.
         """
         view = self.root.children("bufferViews")[index]
         for name in _COMPRESSED_VIEW:
@@ -118,7 +121,7 @@ class GltfDocument:
 
 
 def open_document(path: Path, data: bytes, folder: SceneFolder | None = None) -> GltfDocument:
-    """Parse a .glb or .gltf file and read every file that it refers to.
+    """Parse a .glb or .gltf file, and read its external buffers and images.
 
     Parameters
     ----------
@@ -139,7 +142,7 @@ def open_document(path: Path, data: bytes, folder: SceneFolder | None = None) ->
     ------
     InputError
         For a broken container, malformed JSON, a version other than 2.x, an unknown required extension, or a
-        file outside of `folder`.
+        file outside of `folder`. Also if a top-level member that must be a list is none.
     """
     file, folder = str(path), folder or SceneFolder(path.parent)
     chunks = split_glb(data, file) if data[:4] == MAGIC else Chunks(data, None, ())
@@ -197,7 +200,7 @@ def _parse_json(text: bytes, file: str) -> dict[str, Any]:
 
 
 def _check_depth(root: dict[str, Any], file: str) -> None:
-    """Raise `InputError` for values that are nested more deeply than recursive functions can follow."""
+    """Raise `InputError` if a top-level member is nested more deeply than `_DEEPEST` levels."""
     level = {key: value for key, value in root.items() if isinstance(value, dict | list)}
     for key, top in level.items():
         inside: list[Any] = [top]

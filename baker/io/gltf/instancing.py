@@ -26,7 +26,7 @@ _MEMBERS = {
 
 
 def spread_instances(document: GltfDocument) -> None:
-    """Replace the extension by child nodes; a node whose instance data is broken keeps the extension.
+    """Replace the extension by child nodes. Nodes with broken instance data or without a mesh keep it.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def _members(document: GltfDocument, node: JsonObject) -> list[dict[str, Any]]:
 
 
 def _count(document: GltfDocument, attributes: JsonObject) -> int:
-    """Return the number of instances if all their attributes are application-specific."""
+    """Return the count of a node's first attribute; used if no attribute is part of a transform."""
     accessors = document.root.children("accessors")
     for key in attributes.value:
         return accessors[attributes.index(key, len(accessors), "accessors")].integer("count", minimum=1)

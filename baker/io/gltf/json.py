@@ -58,7 +58,7 @@ class JsonObject:
         return f"{self.where}.{key}" if self.where and key else self.where or key
 
     def integer(self, key: str, default: int | None = None, *, minimum: int = 0) -> int:
-        """Return an integer of at least `minimum`; without a default the member is required."""
+        """Return an integer from `minimum` to 2^53; without a default the member is required."""
         value = self._get(key, default)
         if isinstance(value, float) and value.is_integer():
             # Store the integer in the document, because the writer of scene.glb uses it as an index.

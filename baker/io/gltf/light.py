@@ -19,8 +19,8 @@ from baker.io.gltf.json import JsonObject
 from baker.io.gltf.node import Placed
 
 # Length of the node's -Z axis in world space, divided by the largest singular value of the node's matrix.
-# Spot and directional lights with a smaller ratio are left out. Their direction would consist of rounding
-# errors, because exporters write single precision.
+# Spot and directional lights whose ratio does not exceed this number are left out. Their direction would
+# consist of rounding errors, because exporters write single precision.
 _FLATTEST = 1e-6
 _TINY = float(np.finfo(np.float64).tiny)
 
@@ -44,7 +44,7 @@ def read_light(
     Returns
     -------
     PunctualLight or None
-        The light in world space; None if the node's matrix maps its direction to almost 0.
+        The light in world space; None for a spot or directional light without a direction, see `_FLATTEST`.
 
     Raises
     ------
@@ -83,7 +83,10 @@ def read_light(
 
 
 def _axis(node: Placed) -> tuple[NDArray[np.float64], float]:
-    """Return the node's unit -Z axis in world space, and its unnormalised length / largest singular value."""
+    """Return the node's unit -Z axis in world space, and its unnormalised length / largest singular value.
+
+    If this ratio does not exceed `_FLATTEST`, the axis is (0, 0, -1).
+    """
     linear = node.matrix[:3, :3]
     # Divide by the largest element, so that squares neither overflow nor underflow.
     linear = linear / max(float(np.abs(linear).max()), _TINY)

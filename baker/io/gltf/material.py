@@ -1,7 +1,7 @@
 """Reads glTF materials: base colour, emission, metallic and roughness, sidedness, alpha, and textures.
 
 A texture is read at `T R S uv` (KHR_texture_transform).
-The emitted radiance is `emissiveFactor x texture x emissiveStrength`, cd/m2.
+The emitted radiance is `emissiveFactor x texture x emissiveStrength`, cd/m2; unlit materials emit nothing.
 
 Based on: Khronos Group, glTF 2.0 Specification, section 3.9; KHR_texture_transform; KHR_materials_unlit.
 """
@@ -43,7 +43,8 @@ class MaterialReader:
     Attributes
     ----------
     materials : list of Material
-        In the file's order. A material for which `need` was not called has default values.
+        In the file's order. A material for which `need` was not called has default values. The default
+        material is appended if it was needed.
     warnings : list of SceneWarning
         Warnings about the materials that were read.
     reported : set of int
@@ -66,8 +67,8 @@ class MaterialReader:
         Raises
         ------
         InputError
-            For values of a wrong type or out of range, and textures of base colour or emission that cannot
-            be read.
+            For values of a wrong type or out of range. For a texture of base colour, or of emission if the
+            material emits, that cannot be read.
         """
         if number == len(self._unread):
             if len(self.materials) == number:

@@ -50,7 +50,8 @@ def read_primitives(
     Raises
     ------
     InputError
-        For a missing POSITION, arrays of different length, or an index out of range.
+        For malformed primitives: a missing POSITION, arrays of different length, an index out of range. For
+        data that exists only in Draco-compressed form.
     """
     arrays: list[SourcePrimitive] = []
     warnings: list[SceneWarning] = []
@@ -154,7 +155,7 @@ def _primitive(
 
 
 def _further(document: GltfDocument, attributes: JsonObject, n_vertices: int) -> NDArray[np.uint8] | None:
-    """Return the bytes of the attributes that `_primitive` does not read, (V, B) uint8, or None."""
+    """Return the readable attributes that `_primitive` ignores as bytes, (V, B) uint8; None without any."""
     known = {"POSITION", "NORMAL", "COLOR_0", *(f"TEXCOORD_{k}" for k in range(MAX_TEXCOORDS))}
     root = document.root.value
     row = np.arange(n_vertices, dtype=np.int32)

@@ -121,7 +121,7 @@ class Packer:
         like : dict
             Accessor from which component type, type, normalisation, name and extras are copied.
         bounds : bool
-            Write `min` and `max` even if `like` has none.
+            Write `min` and `max` even if `like` has none. Matrices and values that are not finite get neither.
 
         Returns
         -------
@@ -142,7 +142,7 @@ class Packer:
         return self._add(padded.tobytes(), accessor, {"target": ARRAY_BUFFER, **stride})
 
     def add_floats(self, values: NDArray[np.float32], *, bounds: bool = False) -> int:
-        """Add a float vertex attribute (N, 2 to 4), and return the index of its accessor."""
+        """Add a float vertex attribute (N, C), C = 2 to 4, and return the index of its accessor."""
         like = {"componentType": 5126, "type": f"VEC{values.shape[1]}"}
         data = np.ascontiguousarray(values, "<f4")
         return self.add_rows(data.view(np.uint8).reshape(len(data), -1), like, bounds=bounds)
@@ -216,7 +216,7 @@ def _dump(document: Json) -> bytes:
 
 
 def _finite(node: Any) -> Any:
-    """Return a JSON value with infinite numbers replaced by the largest ones."""
+    """Return a JSON value with infinite numbers replaced by the largest finite ones."""
     if isinstance(node, dict):
         return {key: _finite(value) for key, value in node.items()}
     if isinstance(node, list):
@@ -241,7 +241,7 @@ def primitive_accessors(primitive: Json) -> Iterator[int]:
 
 
 def _bounds(rows: NDArray[np.uint8], dtype: np.dtype[Any]) -> Json:
-    """Return min and max of an accessor; return {} if a value is not finite, which JSON cannot represent."""
+    """Return min and max of an accessor; return {} without rows, or if a value is not finite."""
     values = np.ascontiguousarray(rows).view(dtype)
     if not len(values) or not np.isfinite(values).all():
         return {}
@@ -268,7 +268,7 @@ def _tidy(items: list[Json], free: list[int], blank: Json) -> None:
 
 
 def _unused(document: Json, replaced: frozenset[int]) -> tuple[list[int], list[int]]:
-    """Return the indices of replaced accessors that nothing else can refer to, and of views only they use."""
+    """Return the replaced accessors that nothing else refers to, and the views that only they use."""
     used: set[int] = set()
     for _, mesh in objects(document, "meshes"):
         for _, primitive in objects(mesh, "primitives"):
@@ -328,7 +328,9 @@ def _numbers(node: Any, collect: bool) -> Iterator[int]:
 def _merge(
     views: list[Json], buffers: tuple[bytes, ...], free: list[int], missing: list[int]
 ) -> tuple[list[bytes], int]:
-    """Concatenate all buffers without the bytes that only free views cover; return chunks and length.
+    """Concatenate all readable buffers without the bytes that only free views cover.
+
+    Return the parts of the new buffer, and its length in bytes.
 
     The views are changed in place: `buffer` becomes 0 and `byteOffset` is updated. Missing buffers get the
     indices 1, 2, ..., which are written to their views.

@@ -23,7 +23,7 @@ from baker.io.gltf.node import Placed, local_matrix
 
 # Number of attribute sets JOINTS_k / WEIGHTS_k that are read; each has four joints for each vertex.
 _MAX_SETS = 4
-# Largest coordinate of the centre of a posed mesh's bounding box, divided by the longest edge of the box.
+# Largest absolute coordinate of the centre of a posed mesh's bounding box, divided by the box's longest edge.
 # Above this ratio, positions are stored relative to the centre, and the matrix of the mesh contains the
 # translation.
 _FAR = 8.0
@@ -140,7 +140,7 @@ class Poser:
         joint, weight = np.concatenate(joints, axis=1).astype(np.int64), np.concatenate(weights, axis=1)
         weight = np.nan_to_num(weight, nan=0.0, posinf=0.0, neginf=0.0)
         total = weight.sum(axis=1, keepdims=True)
-        # A vertex without positive weights gets weight 1 for its first joint.
+        # If the sum of a vertex's weights is not positive, its first joint gets weight 1.
         weight = np.where(total > 0, weight / np.where(total > 0, total, 1.0), np.eye(1, weight.shape[1]))
         joint = np.where(weight != 0, joint, 0)
         if len(joint) and joint.max() >= len(matrices):

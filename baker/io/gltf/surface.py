@@ -1,7 +1,7 @@
 """Reads the base colour of a glTF material: metallic-roughness, specular-glossiness, or neither.
 
-The base colour is `baseColorFactor x baseColorTexture`. With KHR_materials_pbrSpecularGlossiness, which takes
-precedence over pbrMetallicRoughness, it is `diffuseFactor x diffuseTexture`.
+The base colour is `baseColorFactor x baseColorTexture`. With KHR_materials_pbrSpecularGlossiness, it is
+`diffuseFactor x diffuseTexture`, also if there is a pbrMetallicRoughness, unless the material is unlit.
 
 Based on: Khronos Group, glTF 2.0 Specification, section 3.9.2; KHR_materials_pbrSpecularGlossiness.
 """

@@ -67,7 +67,7 @@ def unreadable_textures(
     read : set of (str, str)
         The textures that are read for baking, each as (path of the JSON object that contains it, its key).
     reported : set of int
-        Indices of images. The images that the returned warnings name are added.
+        Indices of images. The unreadable image files that the returned warnings name are added.
 
     Returns
     -------
@@ -127,7 +127,7 @@ def _texture_infos(holder: JsonObject) -> Iterator[tuple[JsonObject, str]]:
 
 
 def _check_texture(document: GltfDocument, info: JsonObject) -> None:
-    """Raise `InputError` if the texture's image is missing, truncated or in an unknown format."""
+    """Raise `InputError` if the texture's image is missing, a truncated PNG, or in an unknown format."""
     textures, images = document.root.children("textures"), document.root.children("images")
     texture = textures[info.index("index", len(textures), "textures")]
     extensions = texture.child_or_empty("extensions")

@@ -57,7 +57,7 @@ def read_uri(uri: str, folder: SceneFolder, *, first: int | None = None) -> byte
     Raises
     ------
     UriError
-        If there is no such file, it cannot be read, or the data URI is malformed.
+        If there is no such file, it cannot be read, the data URI is malformed, or the URI is a web address.
     OutsideName
         If none of the file names that the URI may stand for exists inside the scene's folder, and one of them
         is outside.

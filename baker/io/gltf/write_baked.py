@@ -96,7 +96,10 @@ def make_glb(scene: Scene, atlas: Atlas, ao_png: dict[int, bytes] | None = None)
     Raises
     ------
     InputError
-        If the source's data cannot be read, or an image file no longer exists.
+        If the source's data cannot be read, an image file can no longer be read, or one node has several
+        instances.
+    ResourceError
+        If the file would have 4 GiB or more.
     """
     if scene.source is None:
         packer, uses, instance_mesh = new_document(scene, atlas)
@@ -245,7 +248,7 @@ def _rewrite_target(
 
 
 def _decompress_views(document: Json, source: SourceDocument) -> None:
-    """Remove the meshopt extension from views whose buffer contains the uncompressed data."""
+    """Remove the meshopt extension from views whose buffer is readable and contains the uncompressed data."""
     for _, view in objects(document, "bufferViews"):
         for name in _COMPRESSED_VIEW:
             if name in view.get("extensions", {}):
@@ -274,7 +277,7 @@ def embed_images(packer: Packer, source: SourceDocument) -> None:
     Raises
     ------
     InputError
-        If an image file no longer exists.
+        If an image file can no longer be read.
     """
     folder = SceneFolder(source.folder or Path(), source.allow_outside)
     for number, image in objects(packer.document, "images"):

@@ -1,4 +1,4 @@
-"""Writes a glTF document with some primitives edited or replaced; everything else is unchanged."""
+"""Writes a glTF document with some primitives edited or replaced, and with its image files embedded."""
 
 from __future__ import annotations
 

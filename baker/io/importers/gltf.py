@@ -29,8 +29,8 @@ from baker.io.load import IMPORTERS, SceneFile
 from baker.io.mesh.build import build_mesh
 from baker.topology.triangle_check import LARGEST_COORDINATE
 
-# Smallest divided by largest singular value of a node's matrix. Below this ratio, the instance is flat and is
-# left out.
+# Smallest divided by largest singular value of a node's matrix. If the ratio does not exceed this number, the
+# instance is flat and is left out.
 _FLATTEST = 1e-7
 
 # Key of a built mesh: the index of the mesh, and the index of the node if the node has a skin, else None.
@@ -205,7 +205,7 @@ def _users(placed: list[Placed], sources: list[JsonObject]) -> dict[_Key, list[s
 
 
 def _with_nodes(defect: SceneWarning, nodes: list[str]) -> SceneWarning:
-    """Return a warning about a mesh with the first of the nodes that use the mesh, and their number."""
+    """Return a warning, extended by the first node that uses the mesh and the number of other nodes."""
     if nodes == [defect.object]:
         return defect
     more = f" and {len(nodes) - 1} more" if len(nodes) > 1 else ""

@@ -47,7 +47,8 @@ def import_obj(source: SceneFile) -> Scene:
     Raises
     ------
     InputError
-        If the file cannot be parsed, an index is out of range, an image is missing, or no triangle is left.
+        If the file cannot be parsed, an index is out of range, an image of a used material is missing, or no
+        triangle is left.
     """
     file = str(source.path)
     digest = hashlib.sha256(source.data)
@@ -205,7 +206,7 @@ def _check_indices(mesh: Any, counts: tuple[int, ...], file: str, shape: str) ->
 
 
 def _restore_nan(data: bytes, position: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Set a position to NaN if its `v` line contains a word that is no number; the parser reads 0 there."""
+    """Set a position to NaN if one of its three words is no finite number; the parser reads 0 there."""
     if _NOT_NUMBERS.search(data) is None:
         return position
     position = position.copy()

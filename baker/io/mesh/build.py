@@ -1,4 +1,4 @@
-"""Builds a `Mesh` from source primitives: drops invalid triangles and unused vertices, computes normals.
+"""Builds a `Mesh` from source primitives: drops invalid triangles and unused vertices, adds normals.
 
 All importers use `build_mesh`, so that the same rules apply to all formats.
 """
@@ -35,7 +35,8 @@ def build_mesh(
         None if no valid triangle is left. If some primitives lack a TEXCOORD set that other primitives have
         or that their material reads, their uv in that set is 0.
     warnings : list of SceneWarning
-        One for each kind of defect, with the number of triangles or vertices.
+        One for each kind of invalid triangle, with the number of triangles. Others report recomputed normals,
+        and missing or unusable uv.
     """
     primitives = [p for p in primitives if len(p.triangle)]
     if not primitives:
@@ -77,7 +78,10 @@ def _valid_triangles(
     materials: Sequence[Material],
     warnings: list[SceneWarning],
 ) -> list[NDArray[np.int64]]:
-    """Return the valid triangles of each primitive; add a warning with a count for each kind of defect."""
+    """Return the valid triangles of each primitive; add a warning with a count for each kind of defect.
+
+    Triangles of strips that repeat a vertex are dropped without a warning.
+    """
     start = np.cumsum([0] + [len(p.position) for p in primitives])
     position = np.concatenate([p.position for p in primitives])
     triangle = np.concatenate([p.triangle + s for p, s in zip(primitives, start, strict=False)])
@@ -177,7 +181,7 @@ class _Part:
 def _texcoord_sets(
     name: str, parts: Sequence[_Part], materials: Sequence[Material], warnings: list[SceneWarning]
 ) -> set[int]:
-    """Return the TEXCOORD numbers that the mesh needs; add warnings about missing or unusable uv."""
+    """Return the TEXCOORD numbers that the mesh has or its textures read; add warnings about their uv."""
     sets: set[int] = set()
     for part in parts:
         sets.update(part.source.texcoord)

@@ -58,7 +58,7 @@ def read_mtl(
     read_file : callable
         Returns the content of the file with a given name in a given folder. Raises OSError, ValueError or
         OutsideName if the file cannot be read.
-    used : container of str
+    Names of the materials that faces use. Errors in other materials are ignored, except `OutsideError`.
         Names of the materials that faces use. Errors in other materials are ignored.
     decode : callable
         Decodes the content of an image file; see `decode_image`.

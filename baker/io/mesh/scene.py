@@ -62,7 +62,7 @@ def scene_of_meshes(
     Returns
     -------
     Scene
-        The scene. Meshes without a valid triangle are left out with a warning.
+        The scene. Groups without a valid triangle are left out, with a warning if they have invalid ones.
 
     Raises
     ------
