@@ -153,7 +153,7 @@ def _compare(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 class _Truth:
-    """The path-traced irradiance of some texels."""
+    """The path-traced irradiance of the compared texels."""
 
     def __init__(self, path: Path) -> None:
         truth = np.load(path)
@@ -169,7 +169,10 @@ class _Truth:
         }
 
     def error(self, image: NDArray[np.float32]) -> dict[str, float]:
-        """Return the median, 95 % quantile and bias of the relative error of an irradiance map (H, W, 3)."""
+        """Return the errors of an irradiance map (H, W, 3).
+
+        `median` and `p95` are quantiles of the relative error. `bias` is sum(value) / sum(truth) - 1.
+        """
         value = image[self._place].mean(axis=1)
         relative = np.abs(value / self._value - 1.0)
         return {

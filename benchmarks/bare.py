@@ -196,8 +196,8 @@ class BareRays:
         Trace occlusion rays instead of closest-hit rays.
     distance : float
         Length of the rays, metres; inf for unlimited.
-    to_emitters : bool Aim the rays at emissive triangles. Otherwise, they are distributed over the
-    hemisphere.
+    to_emitters : bool
+        Aim the rays at emissive triangles. Otherwise, they are distributed over the hemisphere.
     """
 
     def __init__(

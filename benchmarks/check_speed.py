@@ -1,7 +1,9 @@
 """Measures `baker check` on a mesh of a million triangles with lightmap uv, and on a hundred kit pieces.
 
-python benchmarks/check_speed.py both cases, each in one process, after a run that is not measured python
-benchmarks/check_speed.py --profile time of each check on the million triangles
+Usage:
+
+    python benchmarks/check_speed.py             both cases, each in one process, after an unmeasured run
+    python benchmarks/check_speed.py --profile   time of each check on the million triangles
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ CHARTS = 12
 def bumpy_sheet(side: int = SIDE) -> bytes:
     """Return a GLB file of one wavy sheet.
 
-    Its uv consists of square charts with gaps of a few texels on a page of 2048 x 2048 texels.
+    Its uv consists of square charts with gaps of about ten texels on a page of 2048 x 2048 texels.
     """
     cells = side - 1
     per_chart = cells // CHARTS

@@ -58,7 +58,7 @@ def main() -> None:
 
 
 def _make_plain(material: Any, image: Any) -> tuple[list[float], list[float]]:
-    """Replace a material's nodes by Lambertian reflection and emission; return its albedo and emission."""
+    """Give a material a Lambertian front with emission and a black back; return its albedo and emission."""
     tree = material.node_tree
     old = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeBsdfPrincipled")
     if old.inputs["Base Color"].links or old.inputs["Emission Color"].links:

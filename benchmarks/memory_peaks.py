@@ -1,6 +1,6 @@
 """Prints a table of the peak memory of bakes, estimated by `baker/core/budget.py` and measured.
 
-python benchmarks/memory_peaks.py
+    python benchmarks/memory_peaks.py
 
 Each bake runs in a separate process, whose largest resident memory Linux reports. All bakes together take
 some minutes. `tests/unit/core/test_budget.py` compares estimate and measurement for small bakes.

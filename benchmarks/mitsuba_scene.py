@@ -1,8 +1,8 @@
 """Converts a scene of the reference path tracer to Mitsuba 3, with the same triangles.
 
 Only features with the same meaning in both programs are converted: Lambertian fronts with constant or
-textured colours, black backs, flat normals, and point and directional lights. Callers must first choose a
-variant with `mitsuba.set_variant`.
+textured colours and constant emission, black backs, flat normals, and point and directional lights. Callers
+must first choose a variant with `mitsuba.set_variant`.
 """
 
 from __future__ import annotations

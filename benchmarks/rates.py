@@ -56,7 +56,7 @@ def measure(
           `median` the median time in seconds, `rate` the number of Mrays/s in the shortest time, and `beside`
           the kind of bare rays to compare with.
         - `bare`, `bare_median`: {kind: {`ready`, `made`}}, the largest and the median rate of the loops of
-          `bare.py`, Mrays/s.
+          `bare.py`, Mrays/s. Rays towards emitters have no `made`.
     """
     values: dict[str, Any] = {
         "resolution": resolution,

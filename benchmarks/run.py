@@ -5,8 +5,8 @@
     python benchmarks/run.py --json out.json --markdown
     python benchmarks/run.py --from out.json --into docs/PERFORMANCE.md
 
-Each round bakes every scene once, so that temporary load on the machine affects all scenes. Tables show the
-shortest and the median time of all rounds.
+Each round bakes every scene once at each page size, so that temporary load on the machine affects all bakes.
+Tables show the shortest and the median time of all rounds.
 """
 
 from __future__ import annotations
@@ -199,8 +199,8 @@ def _series(options: argparse.Namespace, folder: Path, cache: Path) -> list[dict
 def _large(options: argparse.Namespace, folder: Path, cache: Path) -> list[dict[str, Any]]:
     """Measure the memory of two bakes with a page of 4096 x 4096 texels.
 
-    The bakes are that of the interior and that of the scene with the most triangles. With `--unwrap-large`,
-    the memory of an unwrap is measured, too.
+    The scenes are the interior and the scene of the series with the most triangles. With `--unwrap-large`,
+    this scene is also baked with a new unwrap at 1024 x 1024 texels.
     """
     if options.no_large:
         return []

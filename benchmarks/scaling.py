@@ -1,7 +1,9 @@
 """Measures one bake on 0, 1 and 2 single-thread cluster workers, and a batch with 1 and 2 jobs at a time.
 
-python benchmarks/scaling.py bake [SCENE]
-python benchmarks/scaling.py batch FOLDER_OF_SCENES
+Usage:
+
+    python benchmarks/scaling.py bake [SCENE]
+    python benchmarks/scaling.py batch FOLDER_OF_SCENES
 """
 
 from __future__ import annotations

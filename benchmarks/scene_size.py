@@ -1,10 +1,10 @@
-"""Prints how the time of load, check, unwrap and bake grows with objects, groups, materials and nodes.
+"""Prints how the time of load, check, unwrap and bake grows with the number of objects, of each of `KINDS`.
 
-python benchmarks/scene_size.py [KIND...] [--counts 500,2000,8000]
+    python benchmarks/scene_size.py [KIND...] [--counts 500,2000,8000]
 
 Each step of each scene runs in a separate process, which reports its processor time. Every object is a
-rectangle. The last column is the exponent k of time ~ count^k between the two largest scenes: 1 is linear,
-2 is quadratic.
+rectangle, or a cube in the kind `inside_out`. The last column is the exponent k of time ~ count^k between the
+two largest scenes: 1 is linear, 2 is quadratic.
 """
 
 from __future__ import annotations

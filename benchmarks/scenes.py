@@ -1,7 +1,7 @@
 """Writes a closed room with bumpy blobs. Its shape is the same for any number of triangles.
 
-The bumps are much larger than the triangles of the coarsest version, so all versions look alike. The scene
-has lightmap uv, so that a bake measures rays and not the unwrap.
+The bumps are several times larger than the triangles if there are at least 10 000, so all such versions look
+alike. The scene has lightmap uv, so that a bake measures rays and not the unwrap.
 
     python benchmarks/scenes.py 100000 blobs.glb
 """
@@ -25,7 +25,7 @@ HALF, HEIGHT = 5.0, 5.0
 CELLS = 8
 # Empty border of a cell, as a share of its side.
 GUTTER = 0.06
-# Height of the bumps on a sphere of radius 0.9 m, metres.
+# Factor of the bump function, whose values are within -1.5 to 1.5, on a sphere of radius 0.9 m, metres.
 BUMP = 0.08
 # Radiance of the ceiling light, cd/m2.
 EMISSION = (60.0, 55.0, 48.0)

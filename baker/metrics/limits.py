@@ -1,7 +1,8 @@
 """Limits on metrics, as `fail_if` takes them: "irradiance.p95 > 0.05, ao.rmse > 0.02".
 
-A limit is a condition for failure: the limit fails if its comparison is true. The absolute values of signed
-metrics such as `bias` are compared, so that a bake that is too dark fails as well as one that is too bright.
+A limit is a condition for failure: the limit fails if its comparison is true. If the number is 0 or more, the
+absolute value of a signed metric such as `bias` is compared, so that a bake that is too dark fails as well as
+one that is too bright.
 """
 
 from __future__ import annotations

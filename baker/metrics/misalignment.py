@@ -1,8 +1,8 @@
 """Detects maps that are shifted against their surface, blurred, or changed by a gamma curve.
 
-A map is shifted if moving it by one texel makes its difference from the reference smaller. The error metrics
-of such a map may be small, because the error is small in smooth areas. A gamma curve was applied to a map if
-its values are a power of the reference with an exponent other than 1.
+A map is shifted if moving it by one texel makes its difference from the reference significantly smaller. The
+error metrics of such a map may be small, because the error is small in smooth areas. A gamma curve was
+applied to a map if its values are a power of the reference with an exponent other than 1.
 """
 
 from __future__ import annotations
@@ -61,7 +61,8 @@ def best_shift(
     Returns
     -------
     rows, columns : int
-        Row and column of the texel that fits, relative to the compared texel. (0, 0) if no shift fits better.
+        Row and column of the texel that fits, relative to the compared texel. (0, 0) if no shift fits better
+        or if fewer than 32 texels can be used.
     """
     misfit = _misfits(page, covered, pixel, truth, noise)
     if misfit is None:

@@ -50,7 +50,7 @@ def outlier_factor(page: NDArray[np.float64], covered: NDArray[np.bool_]) -> NDA
 
 
 def outlier_texels(maps: NDArray[np.float32], covered: NDArray[np.bool_], count: int) -> NDArray[np.int64]:
-    """Return the texels with the largest outlier factor in any component, see `outlier_factor`.
+    """Return the texels with the largest outlier factor in any component, among those above `_MIN_FACTOR`.
 
     Parameters
     ----------
@@ -81,8 +81,9 @@ def steep_texels(maps: NDArray[np.float32], covered: NDArray[np.bool_], count: i
     """Return the texels at which the left and right, or upper and lower, neighbours differ most.
 
     The effect of a shift or a blur of the map is largest at these texels. The difference is relative to the
-    brighter neighbour. For the ranking, this relative difference is limited to one half, so that soft shadow
-    edges have the same rank as sharp edges of gaps.
+    brighter neighbour, and texels up to `_MIN_CHANGE` are left out. For the ranking, this relative difference
+    is limited to one half, so that soft shadow edges have the same rank as sharp edges of gaps. Texels of
+    equal rank are chosen at random.
 
     Parameters
     ----------

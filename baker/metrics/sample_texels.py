@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-# Smallest number of texels chosen on each object. It is reduced if there are many objects, so that these
-# texels are at most a quarter of all chosen texels.
+# Smallest number of texels chosen on each object. If there are many objects, it is reduced (not below 1), so
+# that these texels are at most a quarter of all chosen texels.
 _MIN_PER_OBJECT = 8
 # Number of light levels in each factor of ten.
 LEVELS = 2
@@ -19,7 +19,7 @@ def choose_texels(
     n: int,
     seed: int,
 ) -> NDArray[np.int64]:
-    """Choose about n texels at random, stratified by object and brightness.
+    """Choose about n texels at random, stratified by object and brightness, or all if there are at most n.
 
     First each object gets a minimum number of texels. The remaining texels are distributed in proportion to
     the objects' numbers of texels.

@@ -16,11 +16,11 @@ from baker.kernels.clip import MAX_CORNERS
 from baker.kernels.surface import ROUNDING
 from baker.metrics.kernels.texel_pieces import spread_pieces, texel_owners, texel_pieces
 
-# Share of a texel's square that an instance must cover to own the texel.
+# Share of a texel's square that a triangle must cover for its instance to own the texel.
 _MIN_AREA = 1.0e-3
-# Share of a texel's square that surface covers. Above this share, the texel counts as completely covered.
+# Share of a texel's square that surface covers. From this share on, the texel counts as completely covered.
 _WHOLE = 0.98
-# Limit of the cosine of the angle between a vertex normal and the face normal. Below this limit, the vertex
+# Limit of the cosine of the angle between a vertex normal and the face normal. Up to this limit, the vertex
 # lies at a hard edge, and its tangent plane is not used in `lift`.
 _HARD_EDGE = 0.7
 
@@ -67,7 +67,7 @@ def instance_map(geometry: Geometry, n_pages: int, resolution: int) -> NDArray[n
     Returns
     -------
     (P, H, W) int32
-        Index of the instance, -1 for texels without surface.
+        Index of the instance; -1 for texels of which no triangle covers more than `_MIN_AREA`.
     """
     owner = np.full(n_pages * resolution * resolution, -1, np.int32)
     most = np.full(len(owner), _MIN_AREA, np.float32)
@@ -85,7 +85,7 @@ def surface_points(
     geometry : Geometry
         The triangles of the scene, with the lightmap uv of the bake.
     pixel : (n,) int64
-        (page * resolution + row) * resolution + column, without duplicates.
+        (page * resolution + row) * resolution + column, without duplicates. Each texel must contain surface.
     resolution : int, texels
         Width and height of a page.
     n_points : int

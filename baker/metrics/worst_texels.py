@@ -26,9 +26,9 @@ def worst_texels(
         [NDArray[np.float64], NDArray[np.float64], float], NDArray[np.float64]
     ] = relative_error,
 ) -> list[dict[str, Any]]:
-    """Return the ten texels with the largest significant error.
+    """Return the largest significant errors of texels, at most ten over all channels.
 
-    The significant error is the error minus three standard errors of the reference.
+    The significant error is the relative error minus three relative standard errors of the reference.
 
     Parameters
     ----------
@@ -51,7 +51,8 @@ def worst_texels(
     Returns
     -------
     list of dict
-        One entry for each texel, as `baker verify --json` prints it. The largest significant error is first.
+        One entry for each texel and channel, as `baker verify --json` prints it. The largest significant
+        error is first.
     """
     found = []
     for name, check in channels.items():

@@ -1,4 +1,4 @@
-"""Runs the stages of a bake in order; the only module that connects them.
+"""Runs the stages of a bake in order.
 
 scene -> atlas -> texels -> valid points -> texel sides -> direct light -> patches -> form factors -> solve
 -> final gather -> finished pages -> output folder
@@ -63,7 +63,8 @@ def bake(
     progress : Progress
         Called with the stage, the share of it that is done, and a detail; a truthy return value cancels.
     force : bool
-        Replace `out` even if baker did not write it, and bake even if the estimated memory is not free.
+        Also write into a folder that contains files but no bake, and bake even if the estimated memory is not
+        free.
     executor : TileExecutor, optional
         Runs the tiles of the ray stages; by default, they run in this process.
     atlas : Atlas, optional

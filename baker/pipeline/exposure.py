@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from baker.core.colour import LUMINANCE_WEIGHTS
 
-# Display level, linear, 1 = white, at which the median of the lit texels is shown: mid grey. A higher
-# quantile makes rooms too dark, because many texels may be on outer walls in the sun.
+# Display level, linear, 1 = white, at which the median of the lit texels is shown: mid grey. With a higher
+# quantile, rooms would be too dark, because many texels may be on outer walls in the sun.
 LEVEL = 0.18
-# The result has this number of significant digits, and at most this value, which a 32-bit float can hold.
+# Number of significant digits of the result, and its upper limit, which a 32-bit float can represent.
 _DIGITS = 4
 _LARGEST = 1e30
 # Texels that are processed at a time, to limit memory.

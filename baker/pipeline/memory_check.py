@@ -79,7 +79,7 @@ def check_memory(scene: Scene, settings: BakeSettings, channels: Mapping[str, Ch
 
 
 def _advice(scene: Scene, settings: BakeSettings, channels: Mapping[str, Channel], usable: int) -> str:
-    """Return which setting to lower so that the bake fits, and to what value."""
+    """Return the setting to lower, and the value with which the bake fits if there is one, as a phrase."""
     name, lowest, value = "resolution", float(_LOWEST_RESOLUTION), float(settings.resolution)
     if settings.density is not None:
         name, lowest, value = "density", _LOWEST_DENSITY, settings.density

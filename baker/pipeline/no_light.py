@@ -20,7 +20,8 @@ _WAYS = "to light the scene, make a material emissive, add lights to the file, o
 def fit_to_light(scene: Scene, settings: BakeSettings) -> tuple[BakeSettings, SceneWarning | None]:
     """Leave out the default channels that need light if nothing in the scene emits light.
 
-    All channels are kept if the user has chosen them, or if an export or an encoding needs one of them.
+    All channels are kept if the user has chosen them, if all of them need light, or if an export or an
+    encoding needs a channel that would be left out.
 
     Parameters
     ----------

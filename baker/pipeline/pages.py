@@ -131,7 +131,7 @@ def convergence_warnings(status: NDArray[np.uint8]) -> list[SceneWarning]:
     Returns
     -------
     list of SceneWarning
-        Empty if at most `UNCONVERGED_SHARE` of the texels have the status UNCONVERGED.
+        Empty if at most `UNCONVERGED_SHARE` of the texels on charts have the status UNCONVERGED.
     """
     count = np.bincount(status.ravel(), minlength=len(TexelStatus))
     noisy = int(count[TexelStatus.UNCONVERGED])
@@ -222,7 +222,7 @@ def _mean_square(error: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _statistics(value: NDArray[np.float32], invalid: int) -> dict[str, Any]:
-    """Return the statistics of one channel over the values (n, C) of its covered texels."""
+    """Return the statistics of one channel over the values (n, C) of all texels on charts."""
     if not value.size:
         return {"min": 0.0, "max": 0.0, "mean": 0.0, "clipped": 0, "invalid": invalid}
     return {

@@ -30,7 +30,7 @@ _POLL = 0.1
 _PAGE = 48
 # Number of texels at which light is computed.
 _TEXELS = 16
-# The process, or None if nothing has to be compiled.
+# The process, or None if nothing has to be compiled or nothing can be stored.
 Process = subprocess.Popen[bytes] | None
 
 
@@ -62,7 +62,7 @@ def restart_for_materials(process: Process, scene: Scene) -> Process:
     Returns
     -------
     Process
-        The given process if no material lets light through.
+        The given process if it is None, or if no material lets light through.
     """
     passing = [material for material in scene.materials if _passes(material)]
     if process is None or not passing:
@@ -73,7 +73,7 @@ def restart_for_materials(process: Process, scene: Scene) -> Process:
 
 
 def labelled(process: Process, progress: Progress) -> Progress:
-    """Return a callback that adds to reports that kernels are compiled, as long as the process runs.
+    """Return a callback that marks reports with `COMPILING` as long as the process runs.
 
     Meanwhile, the bake compiles other kernels at their first calls. A stage that usually takes a fraction of
     a second may therefore report no progress for many seconds.
@@ -83,7 +83,7 @@ def labelled(process: Process, progress: Progress) -> Progress:
     process : Process
         From `start` or `restart_for_materials`.
     progress : Progress
-        Receives the reports; those at the beginning of a stage have the detail `COMPILING`.
+        Receives the reports; those with the fraction 0 get the detail `COMPILING`.
 
     Returns
     -------
@@ -101,7 +101,10 @@ def labelled(process: Process, progress: Progress) -> Progress:
 
 
 def _passes(material: Material) -> bool:
-    """Return whether factor and texture of the material have alpha below 1; vertex colours are ignored."""
+    """Return whether alpha x smallest texture alpha of a material is below 1; False for OPAQUE materials.
+
+    Vertex colours are ignored.
+    """
     lowest = material.base_colour[3]
     if material.base_colour_texture is not None:
         alpha = material.base_colour_texture.image[..., 3]

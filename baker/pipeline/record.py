@@ -20,7 +20,7 @@ class Record:
     Attributes
     ----------
     progress : Progress
-        Called at the start of each stage.
+        Called at the start of each stage, and by the stages.
     timings : dict of str to float
         Seconds of each stage.
     rays : dict of str to int

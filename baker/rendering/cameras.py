@@ -29,7 +29,7 @@ def named_camera(cameras: Sequence[Camera], text: str) -> Camera:
     Raises
     ------
     SettingsError
-        If no camera has that name or index, or if several cameras have the name. The message lists the
+        If no camera has that name or index, or if several cameras have the name. The message lists the first
         cameras.
     """
     found = [camera for camera in cameras if camera.name == text]

@@ -85,7 +85,10 @@ class RenderRun:
         return max(most, 1)
 
     def enough(self, estimate: PointEstimate) -> bool:
-        """Return whether to end: all samples are done, or one more pass would exceed the time limit."""
+        """Return whether to end: all samples are done, or one more pass would exceed the time limit.
+
+        At least two passes are made.
+        """
         now = time.monotonic()
         last, self.passed = now - self.passed, now
         self.show(estimate, 0.0)
@@ -159,7 +162,7 @@ def ambient_occlusion(run: RenderRun, distance: float) -> PointEstimate:
             one = new_estimate(len(met), 1, estimate.samples)
             one.rounds = estimate.rounds
             where = (a[met][:, None] for a in (hits.position, hits.normal, hits.face_normal))
-            # Points are numbered from 0 in each block, so each block needs its own seed to get different
+            # Points are numbered from 0 in each block, so each block needs a different seed to get different
             # random numbers.
             seed = (run.settings.seed + 7919 * (begin // _BLOCK)) & 0x7FFFFFFF
             ambient_occlusion_pass(run.reference, one, *where, distance=distance, seed=seed)

@@ -78,7 +78,7 @@ class Picture(Result):
         return self.colour if self.unit != "1" else self.colour[..., :1]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all data but the pixels, as values that JSON can represent."""
+        """Return all data except the pixels, as values that JSON can represent."""
         height, width = self.colour.shape[:2]
         eye = self.camera
         return {
@@ -124,7 +124,7 @@ def render(
     InputError
         If the scene or the bake cannot be read, or if neither the settings nor the scene have a camera.
     SettingsError
-        If the scene has no camera with the name or number in `settings.camera`.
+        If `settings.camera` is malformed, or the scene has no camera with that name or number.
     ResourceError
         If memory runs out, or if the denoiser cannot be used.
     Cancelled

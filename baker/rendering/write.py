@@ -43,10 +43,10 @@ def check_image(path: Path, aov: Collection[str] = ()) -> None:
     Raises
     ------
     SettingsError
-        If `path` has another suffix, is a folder, or has a parent that is a file, or if layers are to be
-        written to a PNG file.
+        If `path` has another suffix or is a folder. If layers are to be written to a PNG file. If
+        `resolved_output` refuses `path`, or if its nearest existing parent is a file.
     ResourceError
-        If the folder is not writable.
+        If the nearest existing parent is not writable.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise SettingsError(f"a picture ends in {' or '.join(SUFFIXES)}", file=str(path))

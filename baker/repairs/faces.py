@@ -89,7 +89,7 @@ def choose_faces(primitive: EditablePrimitive) -> FaceChoice:
 
 
 def _n_at_same_positions(primitive: EditablePrimitive, triangle: NDArray[np.int64]) -> int:
-    """Return how many of the faces (T, 3) have the same three positions as an earlier face."""
+    """Return how many of the faces (T, 3) are at the positions of an earlier face, see `duplicates`."""
     material = np.zeros(len(triangle), np.int32)
     sided = np.full(len(triangle), primitive.double_sided)
     return int(duplicates(primitive.arrays.position, triangle, material, sided).sum())
@@ -98,8 +98,8 @@ def _n_at_same_positions(primitive: EditablePrimitive, triangle: NDArray[np.int6
 def _exact_duplicates(primitive: EditablePrimitive, triangle: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Return (T,) bool: the faces (T, 3) that are rendered exactly like an earlier face.
 
-    A face with the same corners but opposite winding is equal only if the material is double-sided and the
-    normals are opposite. The face is then the back of the earlier face.
+    A face with the same corners but opposite winding is equal only if the material is double-sided, the
+    normals are opposite, and there are no tangents. The face is then the back of the earlier face.
     """
     leave_out = {"NORMAL"} if primitive.reads_lightmap_uv else {"NORMAL", "TEXCOORD_1"}
     column = [data for name, data in primitive.column.items() if name not in leave_out]

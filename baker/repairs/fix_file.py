@@ -78,7 +78,8 @@ class FixResult(Result):
     Attributes
     ----------
     data : bytes
-        The fixed scene as GLB. If the input is a GLB and nothing was fixed, these are the bytes of the input.
+        The fixed scene as GLB. If the input is a GLB that names no other file, and nothing was fixed, these
+        are the bytes of the input.
     fixed : tuple of Fix
     left_alone : tuple of LeftAlone
     """
@@ -139,7 +140,7 @@ def fix_file(path: Path, settings: RepairSettings | None = None, progress: Progr
     InputError
         If the file cannot be read.
     ResourceError
-        If `settings.repair` is set and pymeshlab is not installed.
+        If `settings.repair` is set, and pymeshlab is not installed or fails.
     Cancelled
         If `progress` returned a truthy value.
     """

@@ -43,7 +43,7 @@ class UvRequest:
     def unwrap_settings(self) -> BakeSettings:
         """Return settings that unwrap the mesh alone on a page whose area is `share` of the full page.
 
-        The page is square, and its width is a multiple of 16 texels.
+        The page is square. Its width is rounded to a multiple of 16 texels, from `_SMALLEST` to `resolution`.
         """
         width = min(self.resolution, max(_SMALLEST, 16 * round(self.resolution * np.sqrt(self.share) / 16)))
         return make_settings({"resolution": width, "uv": "unwrap", "threads": self.threads})

@@ -141,7 +141,7 @@ def _lock_empty(primitive: EditablePrimitive, choice: FaceChoice) -> EditablePri
 def _choose_flips(
     primitives: Sequence[EditablePrimitive], triangles: Sequence[NDArray[np.int64]], left: list[str]
 ) -> list[NDArray[np.bool_]]:
-    """Return, for each primitive, the mask (T,) of faces that are wound against their closed piece.
+    """Return, for each primitive, the mask (T,) of faces whose winding disagrees with their closed piece.
 
     `triangles` are the faces (T, 3) of each primitive. Sentences about defects that remain are added to
     `left`.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from baker.core.errors import ResourceError
 
-# Approximate number of points on a surface at which its distance from another surface is measured.
+# Approximate number of points on a surface, or more, at which its distance from another surface is measured.
 _DISTANCE_SAMPLES = 20000
 
 
@@ -122,7 +122,7 @@ def largest_distance(
     """Return the largest distance from points on one surface to another surface.
 
     This is the one-sided Hausdorff distance. It is measured at all vertices of the sampled faces and at
-    points of regular grids on these faces, about `_DISTANCE_SAMPLES` points in total.
+    points of regular grids on these faces, about `_DISTANCE_SAMPLES` points in total or more.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def transfer(
 def _points_on(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return (N, 3) float64: points of regular grids on the faces `triangle`, including all corners.
 
-    The number of points on a face is approximately proportional to its area.
+    The number of points on a face grows with its area; it is at least six.
     """
     corner = position[triangle].astype(np.float64)
     area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)

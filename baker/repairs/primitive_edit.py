@@ -75,7 +75,9 @@ def edit_with_flips(
     touched: bool,
     normals: NormalChoice | None = None,
 ) -> PrimitiveEdit:
-    """Return the edit of a primitive. Normals that point away from the front of a flipped face are negated.
+    """Return the edit of a primitive.
+
+    The normals of a flipped face are negated if their sum points away from the front of the face.
 
     Parameters
     ----------

@@ -27,10 +27,10 @@ def check_fixed(out: Path, scene: Path, *, force: bool = False) -> None:
     Raises
     ------
     SettingsError
-        If the name does not end in .glb, or `out` is a folder or the input file, or `out` exists and `force`
-        is not set.
+        If the name does not end in .glb, or `out` is a folder. If `out` exists, and `force` is False or
+        `check_outputs` refuses it. If `resolved_output` refuses `out`.
     ResourceError
-        If the folder is not writable.
+        If the nearest existing parent is not a writable folder.
     """
     if out.suffix.lower() != ".glb":
         raise SettingsError("a fixed scene is a GLB; name a file that ends in .glb", file=str(out))

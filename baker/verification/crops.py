@@ -25,7 +25,7 @@ from baker.pathtracer.scene import Reference
 SIZE = 24
 # Largest number of crops.
 _MAX_CROPS = 3
-# Number of passes of the path tracer, and number of points in each texel.
+# Largest number of passes of the path tracer, and number of points in each texel.
 _PASSES, _POINTS = 16, 16
 
 
@@ -78,14 +78,14 @@ def trace_crops(
     reference : Reference
         The scene of the path tracer.
     worst : list of dict
-        Texels in order of decreasing error. Windows that overlap an earlier window of the same channel are
-        left out.
+        Texels in order of decreasing error. Windows that overlap an earlier window of the same channel and
+        page are left out.
     bounces : int or None
         Largest number of reflections; None for no limit.
     seed : int
         Seed of the random numbers.
     seconds : float or None
-        Time after which no further pass starts, seconds. Each crop gets at least one pass.
+        Time for all crops, after which no further pass starts. Each crop gets at least one pass.
     progress : Progress
         Receives reports, and may cancel.
 

@@ -55,8 +55,8 @@ class EdgePoints:
 def border_texels(owner: NDArray[np.int32], covered: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return (P, H, W) bool: the border texels of charts.
 
-    These are covered texels with a neighbour that is not covered or lies on another object, and uncovered
-    texels with surface that have a covered neighbour of the same object.
+    These are covered texels with a neighbour that is not covered or lies on another object. Uncovered texels
+    with surface are border texels if the highest object index of their covered neighbours is their object.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ POINTS_PER_TEXEL = 64
 _EDGES, _OUTLIERS, _STEEP = 0.35, 0.05, 0.1
 # Smallest number of points at edges, unless `_EDGES` gives more.
 _MIN_EDGES = 500
-# Smallest number of texels in each light level, divided by the number of random texels.
+# Smallest number of texels in each light level (if it has as many), divided by the number of random texels.
 _SCARCE = 0.1
 
 
@@ -102,7 +102,7 @@ def read_pages(bake: StoredBake, geometry: Geometry, names: list[str]) -> Pages:
     Raises
     ------
     InputError
-        If pages of a channel are missing, or no texel lies on a surface.
+        If pages of a channel are missing, or no texel with a measured value lies on a surface.
     """
     owner = instance_map(geometry, bake.atlas.n_pages, bake.atlas.resolution)
     if any(bake.maps[name].shape[:3] != owner.shape for name in names):

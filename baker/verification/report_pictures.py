@@ -1,7 +1,7 @@
 """Makes the pictures of the HTML report: maps, errors of compared texels, windows around the worst texels.
 
-Maps are shown as value / (value + middle), sRGB-encoded, where middle is the median of the reference over lit
-texels.
+Maps are shown as value / (value + middle), sRGB-encoded. middle is the median of the reference over the lit
+texels that are compared, or over the lit texels of a window.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from baker.io.png import encode_png, srgb_levels
 from baker.metrics.error_metrics import dark_floor, relative_error
 from baker.verification.verify import ChannelCheck, VerifyReport
 
-# Largest side of the image of a page, texels. Larger pages are subsampled.
+# Pages are subsampled so that their images have less than twice this width, texels.
 _SHOWN = 512
 # Relative error at the yellow end of the colour scale.
 _HOT = 0.10

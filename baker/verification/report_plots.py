@@ -69,7 +69,7 @@ def level_plot(rows: list[dict[str, Any]]) -> str:
 
 
 def _steps(low: float, high: float) -> list[float]:
-    """Return three to six round values between two numbers."""
+    """Return at most five round values between two numbers, in equal steps."""
     raw = (high - low) / 4
     power = 10.0 ** math.floor(math.log10(raw))
     step = next(power * m for m in (1, 2, 5, 10) if power * m >= raw)
@@ -107,7 +107,7 @@ def _figure(body: str, caption: str, label: str) -> str:
 
 
 def histogram_plot(histogram: dict[str, list[float]]) -> str:
-    """Return an image of the histogram of z-scores, with the normal distribution of a bake without errors."""
+    """Return a plot of the histogram of z-scores, with the normal distribution of a bake without errors."""
     counts, edges = np.array(histogram["counts"]), np.array(histogram["edges"])
     if not counts.sum():
         return ""

@@ -2,7 +2,7 @@
 
 `baker.pathtracer.inside_geometry` finds the points inside geometry. A texel is in a narrow gap if more than
 half of the rays from its points end within two texels. Texels cannot resolve the light in gaps, so texels in
-gaps are used only for the metrics over all texels.
+gaps are used only for the error metrics over all texels and over the texels of each object.
 
 A room is a set of points that are visible from one point in the air. Points in the air are midpoints of rays
 between surfaces. The point in the air from which most points are visible defines the first room. The point
@@ -30,7 +30,7 @@ _NEAR = 2.0
 # Share of near rays above which a texel is in a gap, and share above which it is in contact with another
 # surface.
 _GAP, _CONTACT = 0.5, 0.1
-# Number of points in the air from which rooms are found, and smallest number of texels in a room.
+# Largest number of points in the air from which a round finds rooms, and smallest number of texels in a room.
 _AIR, _MIN_ROOM = 160, 8
 # Number of rays that test whether a point in the air is inside geometry.
 _AROUND = 32
@@ -219,7 +219,7 @@ def visible(
 def seen_along(
     reference: Reference, origin: NDArray[np.float64], segment: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Return (n,) bool: whether nothing blocks the way from `origin` to `origin + segment`, both (n, 3)."""
+    """Return (n,) bool: whether no surface blocks the segment from `origin` to `origin + segment`, (n, 3)."""
     length = np.linalg.norm(segment, axis=1)
     hits = first_hits(reference, origin, segment / np.maximum(length, 1e-30)[:, None])
     seen: NDArray[np.bool_] = hits.depth > length * (1 - _TOUCH)

@@ -26,7 +26,7 @@ class UnverifiedArea:
     Attributes
     ----------
     total : float
-        Area of all triangles, front sides only.
+        Area of all triangles, one side only.
     invalid : float
         Area on invalid texels, which the bake filled from their neighbours.
     visible : float

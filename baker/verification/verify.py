@@ -69,7 +69,7 @@ class ChannelCheck(Metrics):
     remarks : dict of str to str
         Sentences by metric, each about the fault that the metric indicates.
     unresolved : int
-        Number of texels whose reference did not reach the target standard error.
+        Number of texels whose reference did not reach the target standard error (for AO, twice `AO_ERROR`).
     """
 
     value: NDArray[np.float64]
@@ -124,7 +124,7 @@ class VerifyReport(Result):
     seconds : float
         Duration of the verification, without compilation of kernels.
     compile_seconds : float
-        Duration of compilation, which the first run on a machine needs.
+        Duration of `first_rays`, in which the first run on a machine compiles kernels.
     crops : list of Crop
         Path-traced windows around the texels with the largest errors.
     warnings : list of SceneWarning

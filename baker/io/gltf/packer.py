@@ -121,7 +121,7 @@ class Packer:
         like : dict
             Accessor from which component type, type, normalisation, name and extras are copied.
         bounds : bool
-            Write `min` and `max` even if `like` has none. Matrices and values that are not finite get neither.
+            Write `min` and `max` even if `like` has none. Matrices and infinite values get neither.
 
         Returns
         -------

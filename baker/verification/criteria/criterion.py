@@ -65,7 +65,7 @@ class ChannelData:
     def interior(self) -> NDArray[np.bool_]:
         """Return (n,) bool: points outside gaps, not tilted, in texels covered to at least `_MIN_COVERED`.
 
-        Light levels, regions, objects and charts are compared at these points only.
+        Deviations of light levels, regions, objects and charts are computed at these points only.
         """
         points = self.points
         covered = points.surface.area * points.valid_share >= _MIN_COVERED

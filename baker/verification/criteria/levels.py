@@ -1,10 +1,10 @@
 """Computes the own error of each light level, in dark as well as in bright areas.
 
-The own error is defined in `baker.metrics.groups`. A light level contains all texels, in any room, whose
-light is within the same half power of ten. The darkest 5, 10 and 20 % of all texels are further groups, so
-that a fault of the darkest texels is not hidden among brighter texels. Narrower levels would not detect more
-faults: texels are assigned to levels by values that include the error, so a large error moves a texel to
-another level.
+The own error is defined in `baker.metrics.groups`. A light level contains all compared texels, in any room,
+whose light is within the same half power of ten. The darkest 5, 10 and 20 % of these texels are further
+groups, so that a fault of the darkest texels is not hidden among brighter texels. Narrower levels would not
+detect more faults: texels are assigned to levels by values that include the error, so a large error moves a
+texel to another level.
 """
 
 from __future__ import annotations
@@ -46,7 +46,10 @@ def _span(light: NDArray[np.float64]) -> str:
 
 
 def evaluate(data: ChannelData) -> CriterionResult:
-    """Compute the largest own error of all levels, and a table of the levels in order of increasing light."""
+    """Compute the largest own error of all levels, and a table of the levels in order of increasing light.
+
+    The groups of the darkest texels are included in both.
+    """
     points = data.points
     mine = np.flatnonzero((data.texels | data.scarce) & data.interior & (points.room >= 0))
     light = level_light(data.compared.of(mine), EQUAL_WEIGHT)

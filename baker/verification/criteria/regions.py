@@ -1,6 +1,6 @@
-"""Computes the deviations of regions, relative to the mean light of each region.
+"""Computes bias, colour shift and own error of each region, as `baker.metrics.groups` defines them.
 
-A region is a whole room, or the texels of a room in one light level.
+A region is a room, or the texels of a room in one light level. The texels of no room form one more room.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from baker.verification.criteria.criterion import ChannelData, Criterion, Criter
 from baker.verification.criteria.groups import make_groups, worst_metrics
 from baker.verification.criteria.levels import level_light
 
-# Argument `equal_weight` of `levels.level_light`. It is about the relative error of single texels in a
-# correct map.
+# Relative standard error of the reference at which `level_light` gives reference and map the same weight. It
+# is about the relative error of single texels in a correct map.
 _EQUAL_WEIGHT = 0.03
 # Largest number of objects that are listed for a region.
 _LISTED = 3
 
 
 def evaluate(data: ChannelData) -> CriterionResult:
-    """Compute the largest deviations of regions in rooms, and a table of all regions."""
+    """Compute the largest bias, colour shift and own error of regions in rooms, and a table of regions."""
     points, compared = data.points, data.compared
     mine = data.texels & data.interior
     level = light_level(level_light(compared, _EQUAL_WEIGHT))
@@ -39,7 +39,7 @@ def evaluate(data: ChannelData) -> CriterionResult:
             members.append((name, np.flatnonzero(inside & (level == number))))
             keys[name] = int(room), [low, high]
     groups = make_groups(data, members)
-    # Exclude hidden surface, which is outside rooms, from the metrics. The table includes it.
+    # Leave the texels of no room (room -1) out of the metrics. The table includes them.
     in_rooms = [group for group in groups if keys[group.name][0] >= 0]
     worst, remarks = worst_metrics("region", in_rooms, data.channel)
     position = points.position + data.geometry.origin

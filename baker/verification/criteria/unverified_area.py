@@ -1,4 +1,4 @@
-"""Computes the area of the surface that was not compared, or whose reference is too noisy."""
+"""Computes the area of the surface that is not compared, too noisy, in narrow gaps, or tilted."""
 
 from __future__ import annotations
 
