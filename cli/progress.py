@@ -85,7 +85,7 @@ class Reporter:
         return self._stopped()
 
     def note(self, message: str) -> None:
-        """Write a warning above the bar, or as a line if there is no bar, and remember it in `noted`."""
+        """Write a warning, above the bar if there is one, and append it to `noted`, unless `quiet` is set."""
         if not self._quiet:
             line = f"warning: {printable(in_flags(message))}"
             with self._lock:

@@ -1,4 +1,4 @@
-"""Writes the result of a bake: a short text, or for `--json` parts of the manifest."""
+"""Writes the result of a bake: a short text, and for `--json` also parts of the manifest."""
 
 from __future__ import annotations
 

@@ -124,7 +124,7 @@ def _settle_child(parent: int) -> None:
 
 
 class _Watch:
-    """The parent process: forwards signals to the child, waits for it, and cleans up after a kill."""
+    """The parent process: stops the child after a signal, waits for its end, and cleans up after a kill."""
 
     def __init__(self, child: int, notes: int, as_json: bool) -> None:
         self.child = child

@@ -196,7 +196,7 @@ def ao(
     InputError
         If the scene cannot be read or contains nothing to bake.
     SettingsError
-        For an unknown setting or a value out of range.
+        For an unknown setting, a value out of range, or an atlas of another scene.
     ResourceError
         If memory or disk space runs out, or a library is missing.
     Cancelled

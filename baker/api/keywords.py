@@ -163,7 +163,7 @@ class CheckKeywords(TypedDict, total=False):
     # Lowest severity that fails the check; default: the scene's extras, else error.
     fail_on: Literal["warning", "error"] | None
 
-    # Findings to ignore; `*` matches any letters. Repeatable.
+    # Findings to ignore; `*` matches any characters. Repeatable.
     ignore: str | Sequence[str]
 
     # Coarsest mip level at which charts must not bleed into each other; 0 is the page.

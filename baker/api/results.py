@@ -64,8 +64,8 @@ def verify(
     Returns
     -------
     VerifyReport
-        Metrics of each channel, tables by object, the texels with the largest errors, and whether all limits
-        hold.
+        Metrics of each channel, tables of objects, light levels, regions and the texels with the largest
+        errors, and whether all limits hold.
 
     Raises
     ------

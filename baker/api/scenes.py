@@ -67,7 +67,7 @@ def check(
     progress: Progress = silent,
     **keywords: Unpack[CheckKeywords],
 ) -> CheckReport:
-    """Find defects of a scene because of which a bake would fail or its lightmap would have errors.
+    """Find defects of a scene that make a bake fail or cause errors in its lightmap.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def check(
         fail_on : Literal["warning", "error"] | None, default None
             Lowest severity that fails the check; default: the scene's extras, else error.
         ignore : str | Sequence[str], default ()
-            Findings to ignore; `*` matches any letters. Repeatable.
+            Findings to ignore; `*` matches any characters. Repeatable.
         mip : int, 0 to 14, default 2
             Coarsest mip level at which charts must not bleed into each other; 0 is the page.
         rates : str | Path | None, default None

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from baker.checks.world_triangles import WorldTriangles
 from baker.core.scene import Texture
 
-# Triangles with an emissive texture are subdivided into parts. This limits the number of parts of all
-# triangles together minus the number of these triangles.
+# Triangles with an emissive texture are subdivided into parts. Upper limit of the number of parts of all
+# these triangles minus the number of these triangles.
 _MOST_PARTS = 2048
 
 

@@ -28,7 +28,7 @@ class CheckSettings(Settings):
         None, "Lowest severity that fails the check; default: the scene's extras, else error."
     )
     ignore: Texts = setting(
-        (), "Findings to ignore; `*` matches any letters. Repeatable.",
+        (), "Findings to ignore; `*` matches any characters. Repeatable.",
         metavar="CODE[@OBJECT]", repeated=True,
     )  # fmt: skip
     mip: int = setting(

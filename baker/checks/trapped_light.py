@@ -22,7 +22,7 @@ MOST_GAIN = 20.0
 
 
 def trapped_gain(context: CheckContext, albedo: NDArray[np.float64]) -> float:
-    """Return the gain of light by reflections, as a mean over the points at which light is trapped.
+    """Return the gain of light by reflections at the points at which light is trapped.
 
     Light is trapped at a point if the gain of the paths from this point exceeds `MOST_GAIN`.
 

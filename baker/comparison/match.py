@@ -195,9 +195,9 @@ def _near(
 ) -> TrianglePoints:
     """Return, for n points, the nearest points on triangles along the points' normals.
 
-    A ray passes through each point, from `max_distance` in front of the point to `max_distance` behind it. Of
-    its first `_LAYERS` hits on faces with similar normals, the hit nearest to the point is returned. The
-    triangle is -1 if there is none.
+    A ray passes through each point, from `max_distance` in front of the point to `max_distance` behind it.
+    Its first `_LAYERS` hits are tested. Of the hits on faces with similar normals, the hit nearest to the
+    point is returned. The triangle is -1 if there is no such hit.
 
     Parameters
     ----------

@@ -64,7 +64,7 @@ class Atlas(Result):
     layouts : tuple of InstanceLayout, in the order of `Scene.instances`
     n_charts : int
     padding : int
-        Number of empty texels between charts that were unwrapped.
+        Number of empty texels between charts. Charts of a kept TEXCOORD_1 may be closer.
     warnings : tuple of SceneWarning
     """
 

@@ -38,13 +38,13 @@ MIB = 1 << 20
 # All byte numbers are resident memory, fitted to peaks measured with `benchmarks/memory_peaks.py`.
 # Memory of Python, libraries and compiled kernels together, and memory of each triangle, bytes.
 BASE_BYTES, BYTES_PER_TRIANGLE = 205 * MIB, 350
-# Side above which readers of images halve an image by averaging blocks of 2 x 2 pixels, pixels.
+# Side above which readers of images halve width and height by averaging blocks of 2 x 2 pixels, pixels.
 LARGEST_IMAGE_SIDE = 8192
-# Bytes of memory for each byte of decoded image pixels: 1 for the image of the scene, 1 for the copy that
-# kernels read, and 1.5 for the coarser mip levels of this copy.
+# Bytes of memory for each byte of decoded image pixels, rounded up: 1 for the image of the scene, 1 for the
+# copy that kernels read, and 4/3 for the coarser mip levels of this copy, which are float32.
 BYTES_PER_IMAGE_BYTE = 3.5
-# Number of texels up to which the 16 sample points of each texel are cached between ray stages, and the bytes
-# of these points (position and normal, float32). Bakes with more texels cache no points.
+# Number of texels up to which the 16 sample points of each texel are cached between ray stages, and bytes per
+# texel of these points (position and normal, float32). Bakes with more texels cache no points.
 MAX_CACHED_TEXELS, CACHED_BYTES_PER_TEXEL = 262_144, 384
 # Bytes of all other arrays per texel, in the ray stages and while pages are finished. The first line is for
 # bakes without light, the second for bakes with light.
@@ -187,8 +187,9 @@ class Workload:
     def rays(self, settings: BakeSettings, *, delta_lights: int, emitters: bool) -> dict[Stage, int]:
         """Estimate the number of rays of each stage.
 
-        All texels are counted as if they were near emitters. Rays that only some texels cast are left out:
-        the second pass of `INSIDE_GEOMETRY`, and rays from additional small patches.
+        If there are emitters, all texels count as texels near emitters. Left out are the second pass of
+        `INSIDE_GEOMETRY`, the rays of `TEXEL_SIDES` and `NARROW_GAPS`, and rays from additional small
+        patches.
 
         Parameters
         ----------
@@ -201,7 +202,7 @@ class Workload:
         Returns
         -------
         dict of Stage to int
-            Only stages that the bake runs.
+            Number of rays of each stage that the bake runs.
         """
         hemisphere = settings.hemisphere_samples
         occlusion = settings.ao_samples or hemisphere

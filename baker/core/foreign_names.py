@@ -1,8 +1,8 @@
 """Maps names of settings of other programs to the setting with the same purpose or to a section of LIMITS.md.
 
-The error for an unknown setting recommends this setting or section. Without this table it would recommend
-the setting with the most similar spelling, which usually has another purpose. All names are written with
-dashes, like flags.
+The error for an unknown setting recommends this setting or section. Without the two tables of this module, it
+would recommend the setting with the most similar spelling, which usually has another purpose. All names are
+written with dashes, like flags.
 """
 
 from __future__ import annotations

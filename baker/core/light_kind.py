@@ -93,13 +93,13 @@ class EmissionProfile(NamedTuple):
 
         I(w) = intensity f(w)        E = clamp(1 - (r / range)^4, 0, 1) I(w) / r^2
 
-    The fall-off f depends on c = w . axis. It is 0 for c < min_cosine, and otherwise
+    The fall-off f depends on c = w . axis. If both `cone_scale` and `table` are None, f(w) = 1 for all w, and
+    `min_cosine` is ignored. Otherwise f(w) = 0 for c < min_cosine, and for c >= min_cosine
 
         f(w) = clamp((c - min_cosine) cone_scale, 0, 1)^2       if `cone_scale` is set
         f(w) = bilinear lookup of (c, azimuth around the axis)  if `table` is set
 
-    If both are None, the light shines in all directions: f(w) = 1, and `min_cosine` is ignored. A light
-    without a position is parallel, and a surface that faces it has E = intensity.
+    A light without a position is parallel, and a surface that faces it has E = intensity.
 
     Attributes
     ----------

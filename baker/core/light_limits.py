@@ -6,9 +6,9 @@ from baker.core.errors import InputError
 from baker.core.light_kind import check_light_kinds, kind_of
 from baker.core.scene import Scene
 
-# Largest intensity (cd or lx) and emission (cd/m2) of a component that a bake accepts. Up to this limit, the
-# square of the irradiance fits into float32, except within about 7 mm of a light with a position whose
-# intensity is at the limit. For comparison, the disc of the sun has 2e9 cd/m2.
+# Largest component of an intensity (cd or lx) and of an emission (cd/m2) that a bake accepts. Up to this
+# limit, the square of the irradiance fits into float32, except within about 7 mm of a light with a position
+# whose intensity is at the limit. For comparison, the disc of the sun has 2e9 cd/m2.
 BRIGHTEST = 1e15
 
 

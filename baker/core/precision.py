@@ -17,7 +17,8 @@ from baker.core.scene import Scene, SceneWarning
 
 # Spacing of float32 positions, as a share of a texel's side, above which an object is reported.
 COARSE = 0.1
-# Share of a mesh's vertices, for each axis those with the largest absolute coordinates, that are ignored.
+# Share of a mesh's vertices that are ignored as outliers: for each axis, those with the largest absolute
+# coordinates.
 _OUTLIERS = 0.1
 # A mesh with more vertices is sampled: between this number and twice this number of vertices are read.
 _VERTICES = 1 << 15

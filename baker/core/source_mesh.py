@@ -22,7 +22,7 @@ class SourcePrimitive:
     triangle : (T, 3) int64
         Indices into the vertices; they may be out of range.
     normal : (V, 3) float32 or None, object space
-        None if the file has no normals. Readers then use the normals of the faces.
+        None if the file has no normals, which means flat normals.
     texcoord : dict of int to (V, 2) float32
         TEXCOORD sets by number.
     colour : (V, 4) float32 or None, linear Rec.709

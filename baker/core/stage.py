@@ -12,7 +12,8 @@ class Stage(StrEnum):
     """A step of work that reports its progress under the name in its value.
 
     In the manifest, `timings` has the stages of a bake as keys, except `NARROW_GAPS`, which is a part of
-    `FORM_FACTORS`, and `DENOISE`, which is a part of `FINISH`. `rays` has the stages that cast rays as keys.
+    `FORM_FACTORS`, and `DENOISE`, which is a part of `FINISH`. `rays` has those of these stages that cast
+    rays.
     """
 
     # Stages of a bake, in the order in which they begin. A bake leaves out stages that it does not need.

@@ -38,7 +38,7 @@ class DistributedJobExecutor:
         self._failed: list[Event] = []
 
     def start(self, ticket: int, job: Job, *, threads: int, force: bool) -> None:
-        """Read the scene and send it to a worker, which bakes with all its threads and ignores `threads`."""
+        """Read the scene and send it to a worker. `threads` is ignored; workers use all their threads."""
         assert job.out is not None
         try:
             check_out(job.out, force=force, scene_path=job.scene)

@@ -34,7 +34,7 @@ from baker.radiosity.patches import build_patches
 
 Span = tuple[int, int]
 Result = list[tuple[int, int, Part]]
-# Results of earlier stages: name -> array.
+# Results of earlier stages, arrays by name.
 Arrays = Mapping[str, NDArray[Any]]
 # Function that runs a prepared stage with the given tile runner.
 StageWork = Callable[[TileRunner], object]

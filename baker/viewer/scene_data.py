@@ -182,9 +182,10 @@ def _camera(bake: StoredBake) -> dict[str, Any] | None:
 
 
 def _channel(bake: StoredBake, name: str) -> dict[str, Any]:
-    """Return a channel's unit, files and the percentiles 1, 50 and 99 of its values at texels on surfaces.
+    """Return a channel's name, unit, files, number of components, and percentiles at texels on surfaces.
 
-    The values are luminances if the channel has three components, and otherwise the first component.
+    The percentiles 1, 50 and 99 are those of the luminance if the channel has three components, and otherwise
+    those of the first component.
     """
     pages = [page for page in bake.manifest["pages"] if page["channel"] == name]
     value = bake.maps[name]

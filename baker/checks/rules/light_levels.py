@@ -13,7 +13,8 @@ from baker.checks.rule import check
 from baker.core.encoding import ALWAYS_WRITTEN, ENCODINGS
 from baker.core.readable import amount, number
 
-# Number of rays from the emitting faces of each object, and from each of their sides if any is double-sided.
+# Number of rays from the fronts of the emitting faces of an object. If any of these faces is double-sided, as
+# many rays are traced from the backs.
 FACING_RAYS = 64
 
 

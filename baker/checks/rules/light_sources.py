@@ -20,8 +20,8 @@ from baker.topology.winding_number import first_inside
 MOST_REFLECTED = 0.95
 # Albedo above which paths are traced to find trapped light.
 NEARLY_WHITE = 0.98
-# Radiance of a material above which its unit is probably wrong, cd/m2. `LightKind.plausible_max` is the same
-# for lights without area.
+# Radiance of a material above which its unit is probably wrong, cd/m2. The limit for the intensity of lights
+# without area is `LightKind.plausible_max`.
 ABSURD_EMISSION = 1e8
 # y component of the unit normal above which a face counts as a floor.
 FLOOR = 0.5
