@@ -7,7 +7,6 @@ import os
 import re
 import shutil
 import struct
-from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -26,9 +25,6 @@ STANDARD_LIGHTS = ("directional", "point", "spot")
 EXPOSURE_KEY = "suggested_exposure"
 # Header attributes of a page that `write_page` copies, because they stay valid after a division.
 _KEPT = ("colourSpace", "software")
-
-# Changes a glTF document and the content of `lightmap.json` in place.
-Change = Callable[[dict[str, Any], dict[str, Any]], None]
 
 
 def read_manifest(bake: Path) -> dict[str, Any]:
@@ -185,8 +181,8 @@ def write_readme(
     write_text(target / "README.md", "\n".join(lines) + "\n")
 
 
-def place_named_scene(bake: Path, target: Path, change: Change | None = None) -> dict[str, Any]:
-    """Write scene.glb with a unique name for each node, for engines that identify nodes by name.
+def named_scene(bake: Path) -> tuple[dict[str, Any], dict[str, Any], bytes]:
+    """Read scene.glb with a unique name for each node, for engines that identify nodes by name.
 
     The name of node i is its old name, with characters that engines interpret replaced by `_`, followed by
     `_n<i>`. The mesh of a baked node gets the same name, and `extras.baker_node` is i.
@@ -195,14 +191,15 @@ def place_named_scene(bake: Path, target: Path, change: Change | None = None) ->
     ----------
     bake : Path
         Folder of the bake.
-    target : Path
-    change : callable, optional
-        Changes the glTF document and the content of `lightmap.json` before the scene is written.
 
     Returns
     -------
-    dict
+    document : dict
+        The glTF document with the new names.
+    description : dict
         The content of `lightmap.json` with the new names.
+    binary : bytes
+        The binary chunk with its 8-byte header.
     """
     description = describe(read_manifest(bake))
     with (bake / SCENE_NAME).open("rb") as file:
@@ -221,26 +218,40 @@ def place_named_scene(bake: Path, target: Path, change: Change | None = None) ->
         entry["name"] = node["name"]
         if "mesh" in node:
             document["meshes"][node["mesh"]]["name"] = node["name"]
-    if change is not None:
-        change(document, description)
+    return document, description, binary
+
+
+def write_scene(target: Path, document: dict[str, Any], binary: bytes) -> None:
+    """Write scene.glb into `target`; `binary` is the binary chunk with its 8-byte header."""
     (target / SCENE_NAME).write_bytes(_glb(document, binary))
+
+
+def place_named_scene(bake: Path, target: Path) -> dict[str, Any]:
+    """Write the scene with unique names into `target`; return the content of `lightmap.json`."""
+    document, description, binary = named_scene(bake)
+    write_scene(target, document, binary)
     return description
 
 
 def place_named_bake(bake: Path, target: Path) -> dict[str, Any]:
     """Write pages, `lightmap.json` and the scene with unique names into `target`; return the JSON content."""
     description = place_named_scene(bake, target)
-    for page in description["pages"]:
-        link_file(bake / page["file"], target / page["file"])
-    write_json(target / DESCRIPTION_NAME, description)
+    place_description(bake, target, description)
     return description
 
 
-def unique_name(name: str, node: int) -> str:
-    """Return a name that engines do not change and that no other node has."""
+def place_description(bake: Path, target: Path, description: dict[str, Any]) -> None:
+    """Put the pages of `lightmap.json` and the file itself into `target`."""
+    for page in description["pages"]:
+        link_file(bake / page["file"], target / page["file"])
+    write_json(target / DESCRIPTION_NAME, description)
+
+
+def unique_name(name: str, number: int, kind: str = "n") -> str:
+    """Return a name that engines do not change and that no other node has; `kind` is "n" for nodes."""
     safe = re.sub(r"[^0-9A-Za-z_]+", "_", name).strip("_") or "node"
     # Keep names short, because Blender truncates them to 63 bytes.
-    return f"{safe[:48]}_n{node}"
+    return f"{safe[:48]}_{kind}{number}"
 
 
 def _replace_lights(document: dict[str, Any]) -> bool:

@@ -18,11 +18,12 @@ from typing import Any
 from baker.core.export import EXPORTS
 from baker.exporters.common import (
     DESCRIPTION_NAME,
-    place_named_scene,
+    named_scene,
     template,
     write_json,
     write_page,
     write_readme,
+    write_scene,
     write_text,
 )
 
@@ -48,7 +49,11 @@ class UnityExport:
 
     def write(self, bake: Path, target: Path) -> None:
         """Write the files of the export into `target`."""
-        description = place_named_scene(bake, target, change=_remove_occlusion)
+        document, description, binary = named_scene(bake)
+        # Unity would darken the lightmaps by these textures, and the lightmaps contain occlusion already.
+        for material in document.get("materials", []):
+            material.pop("occlusionTexture", None)
+        write_scene(target, document, binary)
         for page in description["pages"]:
             write_page(
                 bake,
@@ -97,12 +102,6 @@ def unity_description(description: dict[str, Any]) -> dict[str, Any]:
             for entry in description["objects"]
         ],
     }
-
-
-def _remove_occlusion(document: dict[str, Any], description: dict[str, Any]) -> None:
-    """Remove the occlusion textures, by which Unity would darken lightmaps that contain occlusion already."""
-    for material in document.get("materials", []):
-        material.pop("occlusionTexture", None)
 
 
 def scale_offset(scale: list[float], offset: list[float]) -> list[float]:

@@ -93,20 +93,28 @@ def write_probe(
 
     The distant square is on the second page, which is black. `builder` may have more nodes without meshes.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    scene = load_scene(write(folder / "probe.glb", builder or probe_builder()))
-    layouts = tuple(_whole(scene, index) for index in range(2))
     light = np.stack([probe_page() if page is None else page, np.zeros((SIZE, SIZE, 3), np.float32)])
+    return write_made_up(folder, builder or probe_builder(), light, exports, **settings)
+
+
+def write_made_up(
+    folder: Path, builder: GltfBuilder, light: np.ndarray, exports: str, **settings: object
+) -> Path:
+    """Write a bake with this irradiance, a page for each object, and return the output folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    scene = load_scene(write(folder / "probe.glb", builder))
+    count = len(scene.instances)
+    layouts = tuple(_whole(scene, index) for index in range(count))
     result = BakeResult(
         scene=scene,
-        atlas=Atlas(SIZE, 2, layouts, 2, 0),
+        atlas=Atlas(SIZE, count, layouts, count, 0),
         settings=make_settings({"resolution": SIZE, "export": exports, **settings}),
         lightmaps={
             "irradiance": make_lightmap("irradiance", light),
-            "ao": make_lightmap("ao", np.full((2, SIZE, SIZE, 1), 0.5, np.float32)),
+            "ao": make_lightmap("ao", np.full((count, SIZE, SIZE, 1), 0.5, np.float32)),
         },
-        status=np.ones((2, SIZE, SIZE), np.uint8),
-        texel_count=np.full(2, SIZE * SIZE),
+        status=np.ones((count, SIZE, SIZE), np.uint8),
+        texel_count=np.full(count, SIZE * SIZE),
     )
     write_bake(result, folder / "out")
     return folder / "out"
