@@ -1,4 +1,7 @@
-"""Finishes pages: fills invalid texels, removes noise, corrects values to texel centres, dilates charts."""
+"""Finishes pages: fills invalid texels, removes noise, dilates charts.
+
+Before the dilation, the values of partly covered texels are extrapolated to the texel centres.
+"""
 
 from __future__ import annotations
 
@@ -21,14 +24,14 @@ from baker.finish.oidn import LightmapDenoiser
 from baker.finish.packing import pack_charts
 from baker.finish.texel_centre import recentre
 
-# Limit of the RMS relative noise of a brightness band, see `BAND`. Up to this limit, the texels of the band
-# are not denoised, because the filter hardly reduces such small errors. In the scene Cornell with 64 samples,
-# the median error was 0.33 % with the filter and 0.35 % without.
+# Limit of the RMS relative noise of a brightness band, see `BAND`. A chart is denoised only if some of its
+# texels lie in a band of at least `FEWEST` texels above this limit. The filter hardly reduces smaller
+# errors. In the scene Cornell with 64 samples, the median error was 0.33 % with the filter and 0.35 %
+# without.
 NOT_WORTH_FILTERING = 0.02
-# BAND: width of a brightness band, the ratio of the largest to the smallest mean light of its charts or
-# blocks.
-# FEWEST: smallest number of texels of a band that is denoised.
+# Largest ratio of the mean brightnesses of two charts or blocks in one brightness band.
 BAND = 8.0
+# Smallest number of texels of a band whose noise is considered.
 FEWEST = 64
 # Limit of the ratio of the arithmetic to the geometric mean of a chart's light. Above this limit, the chart
 # is split into blocks, and each block is assigned to a brightness band separately.
@@ -83,8 +86,8 @@ class PageLayer(NamedTuple):
     The page is the sum of its layers, which are denoised separately.
 
     value : (H, W, C) float32
-    error : (H, W) or (H, W, G) float32, standard error of the mean of all components, or of the mean of the
-        components in each of the G groups of `ComponentRules.groups`
+    error : (H, W) float32, standard error of the mean of the components, such as (R + G + B) / 3; or
+        (H, W, G) float32, the same for each of the G groups of `ComponentRules.groups`
     bound : bool, whether `error` is an upper bound
     kept : (H, W) bool or None, texels that are not denoised
     """
@@ -237,10 +240,11 @@ def finish_page(
 def _denoised(
     plan: PagePlan, layer: PageLayer, light: _Light, rules: ComponentRules, finisher: Finisher
 ) -> NDArray[np.float32]:
-    """Return (H, W, C) float32: a layer without invalid texels, after denoising its noisy charts.
+    """Return (H, W, C) float32: the layer with its noisy charts denoised.
 
-    `finish.keep_light` restores the light that the filter removed. It is not applied to signed components,
-    because relative changes of a sum near 0 are meaningless.
+    The invalid texels of the layer must have been filled. `finish.keep_light` restores the light that the
+    filter removed. It is not applied to signed components, because relative changes of a sum near 0 are
+    meaningless.
     """
     denoiser = finisher.denoiser
     worth = _worth_filtering(plan, _mean_error(layer, rules), light) if denoiser else None
@@ -325,10 +329,11 @@ class _Light(NamedTuple):
 
 
 def _light(plan: PagePlan, layers: list[PageLayer], rules: ComponentRules) -> _Light:
-    """Return brightness and group of the valid texels of the sum of all layers.
+    """Return brightness and group of the valid texels.
 
-    Brightness is the mean of the components or, if they are signed, of their absolute values. A brightness
-    below a tenth of the mean brightness of the texel's group is raised to this tenth.
+    Brightness is the sum, over the layers, of the mean of the components or, if they are signed, of the mean
+    of their absolute values. A brightness below a tenth of the mean brightness of the texel's group is raised
+    to this tenth.
     """
     total = np.zeros(int(plan.valid.sum()))
     for layer in layers:
@@ -347,12 +352,12 @@ def _light(plan: PagePlan, layers: list[PageLayer], rules: ComponentRules) -> _L
 
 
 def _worth_filtering(plan: PagePlan, error: NDArray[np.float32], light: _Light) -> NDArray[np.bool_] | None:
-    """Return (n_charts,) bool: the charts to filter, or None if no brightness band is noisy.
+    """Return (n_charts,) bool: the charts to filter, or None if no noisy band has `FEWEST` texels.
 
     Relative noise is averaged over brightness bands, which are sets of groups with similar brightness. If
     noise were divided by the mean of the whole page instead, the noise of a dim room beside sunlit ground
-    would seem negligible. Charts without noise are excluded, because the filter derives its exposure from all
-    texels of its input.
+    would seem negligible. Charts with at most `QUIET` noise are left out, because the filter derives one
+    exposure from all texels of its input.
 
     error : (H, W) float32, standard error of each texel's brightness
     """
