@@ -118,7 +118,7 @@ def _step(program: Program, line: str, folder: Path, temporary: Path, places: di
     words = shlex.split(line)
     environment = {**program.environment, "TMPDIR": str(temporary)}
     if words[0] == "@remove":
-        (folder / words[1]).unlink()
+        (folder / words[1]).unlink(missing_ok=True)
         return {"command": line}
     if words[0] == "@copy":
         shutil.copyfile(folder / words[1], folder / words[2])
@@ -154,7 +154,7 @@ def _view(
                 break
             except ValueError:
                 continue
-        if found is not None:
+        if found is not None and "url" in found:
             _fetch(found["url"], folder / "fetched")
         process.send_signal(signal.SIGINT)
         rest, errors = process.communicate(timeout=LONGEST)

@@ -115,6 +115,11 @@ def program_of(commit: str, folder: Path) -> Program:
         if not target.exists():
             target.symlink_to(folder / source)
     (base / "sitecustomize.py").write_text(_NO_EDITABLE)
+    # The program reads its version from the metadata of its distribution, whose name differs between commits.
+    name, version = project["project"]["name"], project["project"].get("version", "0")
+    metadata = base / f"{name.replace('-', '_')}-{version}.dist-info" / "METADATA"
+    metadata.parent.mkdir(exist_ok=True)
+    metadata.write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
     module, function = project["project"]["scripts"]["baker"].split(":")
     start = f"import sys; sys.argv[0] = 'baker'; from {module} import {function}; {function}()"
     program = Program([sys.executable, "-P", "-c", start], folder, base.resolve())
