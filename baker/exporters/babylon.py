@@ -32,7 +32,7 @@ class BabylonExport:
             "The option `{ exposure: x }` multiplies all light by x.",
             uv="TEXCOORD_1, which is `coordinatesIndex = 1`.",
             rows="v = 0 is the first row of each file. Babylon.js stores the rows of an EXR bottom-up, so "
-            "lightmap.js replaces v by 1 - v. For KTX2 pages (`--encode ktx2`, option `{ zstd: decoder }`), "
+            "lightmap.js replaces v by 1 - v. For KTX2 pages (encoding `ktx2`, option `{ zstd: decoder }`), "
             "v stays.",
         )
 

@@ -32,7 +32,7 @@ class ThreeExport:
             "in cd/m2. The option `{ exposure: x }` multiplies all light by x.",
             uv="TEXCOORD_1, which is `uv1`; a texture needs `channel = 1`.",
             rows="v = 0 is the first row of each file. EXRLoader stores the rows bottom-up, so lightmap.js "
-            "replaces v by 1 - v. For KTX2 pages (`--encode ktx2`, option `{ ktx2: loader }`), v stays.",
+            "replaces v by 1 - v. For KTX2 pages (encoding `ktx2`, option `{ ktx2: loader }`), v stays.",
         )
 
 
