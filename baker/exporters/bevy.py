@@ -55,8 +55,8 @@ class BevyExport:
             target,
             "Lightmaps for Bevy",
             steps=(
-                "Copy the folder to assets/bevy, and baker_lightmaps.rs into your crate. Enable the features",
-                "`ktx2` and `zstd_rust` (Bevy 0.16: `zstd`). Spawn scene.glb, and add the plugin:",
+                "Copy the folder to assets/bevy, and baker_lightmaps.rs into your crate. Bevy needs the",
+                "features `ktx2`, `png` and `zstd_rust` (0.16: `zstd`). Spawn scene.glb, and add the plugin:",
                 '`app.add_plugins(BakerLightmapsPlugin { folder: "bevy".into() })`. Spawn the camera with',
                 "`Exposure { ev100: EV100 }` and `AmbientLight { brightness: 0.0, ..default() }`.",
             ),
