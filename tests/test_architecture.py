@@ -155,9 +155,14 @@ def test_a_heavy_library_has_one_home(library):
     assert len(homes) <= 1, homes
 
 
-def test_pillow_has_one_reader_and_one_writer():
+def test_pillow_is_imported_by_readers_and_writers_of_pictures_only():
     homes = [name_of(path) for path in sources(*PACKAGES) if "PIL" in imported(path)]
-    assert set(homes) <= {"baker/io/images.py", "baker/io/png.py"}
+    assert set(homes) <= {
+        "baker/io/images.py",
+        "baker/io/picture_file.py",
+        "baker/io/png.py",
+        "baker/io/webp.py",
+    }
 
 
 def test_numba_lives_low():

@@ -82,7 +82,7 @@ def bake(
         denoise : bool, default True
             Denoise with Open Image Denoise.
         encode : str | Sequence[str], default ()
-            Additional file formats of each page: `hdr`, `ktx2`, `rgbm` for maps with three colours;
+            Additional file formats of each page: `hdr`, `ktx2`, `rgbm`, `webp` for maps with three colours;
             `png16`, `png8` for maps with one value per texel.
         export : str | Sequence[str], default ()
             Engines for which a subfolder is written: `three`, `babylon`, `godot`, `unity` ..., see

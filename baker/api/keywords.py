@@ -61,8 +61,8 @@ class BakeKeywords(TypedDict, total=False):
     # Denoise with Open Image Denoise.
     denoise: bool
 
-    # Additional file formats of each page: `hdr`, `ktx2`, `rgbm` for maps with three colours;
-    # `png16`, `png8` for maps with one value per texel.
+    # Additional file formats of each page: `hdr`, `ktx2`, `rgbm`, `webp` for maps with three
+    # colours; `png16`, `png8` for maps with one value per texel.
     encode: str | Sequence[str]
 
     # Engines for which a subfolder is written: `three`, `babylon`, `godot`, `unity` ..., see

@@ -79,6 +79,8 @@ class Encoding(ABC, Generic[Options]):
         Whether the format can store negative values.
     options_type : type of `EncodingOptions`
         Class of its options.
+    largest : int
+        Largest width and height of an image in this format, texels.
     when_clipped, when_banded : str
         Advice at the end of the warning about a page that exceeds the limits, or that has visible steps.
     """
@@ -86,6 +88,7 @@ class Encoding(ABC, Generic[Options]):
     suffix: str
     components: tuple[int, ...]
     signed: bool = False
+    largest: int = LARGEST_SIDE
     options_type: type[Options]
     when_clipped: str = "use the EXR"
     when_banded: str = "use the EXR"

@@ -47,7 +47,7 @@ SAME = {
     "sky-strength": ("sky-intensity", "environment-intensity", "world-strength", "sky-exposure"),
     "threads": ("cores", "workers", "cpus", "num-threads"),
     "export": ("engine", "target", "platform"),
-    "encode": ("format", "file-format", "output-format", "hdr", "ktx2", "rgbm", "png"),
+    "encode": ("format", "file-format", "output-format", "hdr", "ktx2", "rgbm", "png", "webp"),
     "channels": ("passes", "pass", "maps", "bake-type", "type", "aov", "layers"),
     "quality": ("preset", "fast", "preview", "draft", "final"),
     "force": ("overwrite", "yes"),

@@ -1,26 +1,63 @@
-"""Encodes high dynamic range in an 8-bit RGBA PNG (RGBM), for engines and phones without float textures.
+"""Encodes high dynamic range in 8-bit RGBA pictures (RGBM), for engines and phones without float textures.
+
+`rgbm` registers PNG files, and `webp` lossless WebP files, which are smaller.
 
 `value = top * (rgb * a)^GAMMA`, where rgb and a are the stored bytes / 255, without sRGB decoding. The alpha
 channel `a` is the largest of the three `(value / top)^(1 / GAMMA)`, rounded up, so that rgb never exceeds 1.
-`top`, the value of `rgbm_range` in lx, and GAMMA are in the file's text chunks.
+`top`, the value of `rgbm_range` in lx, and GAMMA are among the texts of the file.
 
 Based on: B. Karis, RGBM color encoding, 2009; Unity's RGBM lightmaps, which also use a gamma of 2.2.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.encoding import ENCODINGS, DecodedImage, Encoding, EncodingOptions, check_pixels, write_image
+from baker.core.encoding import (
+    ENCODINGS,
+    LARGEST_SIDE,
+    DecodedImage,
+    Encoding,
+    EncodingOptions,
+    check_pixels,
+    write_image,
+)
 from baker.core.errors import InputError, SettingsError
 from baker.core.settings_model import FILES, Text, setting
 from baker.io.png import decode_png, encode_png, png_size
 
 GAMMA = 2.2
+
+
+@dataclass(frozen=True)
+class PictureFormat:
+    """A lossless file format for pictures with four components of 8 bits.
+
+    Attributes
+    ----------
+    suffix : str
+        End of the file names.
+    encode : callable
+        Returns the bytes of a file with pixels (H, W, 4) uint8 and texts.
+    decode : callable
+        Reads a file and returns its pixels and texts.
+    size : callable
+        Reads the header of a file and returns width and height.
+    largest : int
+        Largest width and height, pixels.
+    """
+
+    suffix: str
+    encode: Callable[[NDArray[np.uint8], Mapping[str, str]], bytes]
+    decode: Callable[[Path], tuple[NDArray[np.unsignedinteger[Any]], dict[str, str]]]
+    size: Callable[[Path], tuple[int, int]]
+    largest: int = LARGEST_SIDE
 
 
 class RgbmOptions(EncodingOptions):
@@ -57,13 +94,16 @@ class RgbmOptions(EncodingOptions):
 
 
 class RgbmEncoding(Encoding[RgbmOptions]):
-    """RGBM files; registered as `rgbm`."""
+    """Writes and reads RGBM pictures in a file format."""
 
-    suffix = ".rgbm.png"
     components: tuple[int, ...] = (3,)
     options_type = RgbmOptions
     when_clipped = "raise `rgbm_range` or set it to auto"
     when_banded = "lower `rgbm_range` or use the EXR"
+
+    def __init__(self, format: PictureFormat) -> None:
+        self.suffix, self.largest = format.suffix, format.largest
+        self._format = format
 
     def fitted(self, options: RgbmOptions, brightest: float) -> RgbmOptions:
         """Replace `auto` by the map's largest value, or by 1 for a black map."""
@@ -108,22 +148,22 @@ class RgbmEncoding(Encoding[RgbmOptions]):
         """
         check_pixels(pixels, self.components, path.name)
         about = {**header, "rgbm": "value = top * (rgb * a)^gamma", "top": repr(options.top)}
-        data = encode_png(_to_rgbm(pixels, options.top), {**about, "gamma": repr(GAMMA)})
+        data = self._format.encode(_to_rgbm(pixels, options.top), {**about, "gamma": repr(GAMMA)})
         write_image(path, data)
 
     def size(self, path: Path) -> tuple[int, int]:
-        """Return width and height; see `png_size`."""
-        return png_size(path)
+        """Return width and height."""
+        return self._format.size(path)
 
     def decode(self, path: Path) -> DecodedImage:
-        """Read a file whose text chunks contain `top` and `gamma`.
+        """Read a file whose texts contain `top` and `gamma`.
 
         Raises
         ------
         InputError
-            If the file is missing, no PNG, or lacks these text chunks.
+            If the file is missing, has another format, or lacks these texts.
         """
-        pixels, header = decode_png(path)
+        pixels, header = self._format.decode(path)
         try:
             top, gamma = float(header["top"]), float(header["gamma"])
         except (KeyError, ValueError):
@@ -133,7 +173,7 @@ class RgbmEncoding(Encoding[RgbmOptions]):
         return DecodedImage(_from_rgbm(pixels, top, gamma), header, "uint", ("R", "G", "B"))
 
 
-ENCODINGS.register("rgbm")(RgbmEncoding())
+ENCODINGS.register("rgbm")(RgbmEncoding(PictureFormat(".rgbm.png", encode_png, decode_png, png_size)))
 
 
 def _root(pixels: NDArray[np.float32], top: float) -> NDArray[np.float64]:
@@ -150,7 +190,9 @@ def _to_rgbm(pixels: NDArray[np.float32], top: float) -> NDArray[np.uint8]:
     return np.concatenate([colour, multiplier], axis=-1).astype(np.uint8)
 
 
-def _from_rgbm(code: NDArray[np.uint8], top: float, gamma: float = GAMMA) -> NDArray[np.float32]:
+def _from_rgbm(
+    code: NDArray[np.unsignedinteger[Any]], top: float, gamma: float = GAMMA
+) -> NDArray[np.float32]:
     share = code.astype(np.float64) / 255.0
     value: NDArray[np.float32] = (top * (share[..., :3] * share[..., 3:]) ** gamma).astype(np.float32)
     return value

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from baker.core.export import EXPORTS
-from baker.exporters.common import place_bake, template, write_readme, write_text
+from baker.exporters.common import place_web_bake, template, write_readme, write_text
 
 
 class BabylonExport:
@@ -15,7 +15,7 @@ class BabylonExport:
 
     def write(self, bake: Path, target: Path) -> None:
         """Write the files of the export into `target`."""
-        place_bake(bake, target, encodings=("ktx2",))
+        place_web_bake(bake, target)
         write_text(target / "lightmap.js", template("babylon", "lightmap.js"))
         write_readme(
             bake,
@@ -32,8 +32,8 @@ class BabylonExport:
             "The option `{ exposure: x }` multiplies all light by x.",
             uv="TEXCOORD_1, which is `coordinatesIndex = 1`.",
             rows="v = 0 is the first row of each file. Babylon.js stores the rows of an EXR bottom-up, so "
-            "lightmap.js replaces v by 1 - v. For KTX2 pages (encoding `ktx2`, option `{ zstd: decoder }`), "
-            "v stays.",
+            "lightmap.js replaces v by 1 - v. For the pages of the encodings `ktx2` (option "
+            "`{ zstd: decoder }`) and `webp` (option `{ webp: true }`), v stays.",
         )
 
 

@@ -103,19 +103,29 @@ def place_bake(bake: Path, target: Path, *, encodings: tuple[str, ...] = ()) -> 
         Folder of the bake.
     target : Path
     encodings : tuple of str
-        Further encodings of a page that are placed, too, if the bake has them. The page's entry in
-        `lightmap.json` then has the name of the file under the name of the encoding.
+        Encodings of which the files of a page are placed, too, if the bake has them. The page's entry in
+        `lightmap.json` lists them with file and largest value.
     """
     manifest = read_manifest(bake)
     description = describe(manifest)
     place_scene(bake, target)
     for page, source in zip(description["pages"], irradiance_pages(manifest), strict=True):
-        others = {entry["encoding"]: entry["file"] for entry in source.get("encodings", [])}
-        page |= {name: others[name] for name in encodings if name in others}
-        for file in (page["file"], *(page[name] for name in encodings if name in page)):
-            link_file(bake / file, target / file)
+        page["encodings"] = {
+            entry["encoding"]: {"file": entry["file"], "max": entry["max"]}
+            for entry in source.get("encodings", [])
+            if entry["encoding"] in encodings
+        }
+        for placed in (page, *page["encodings"].values()):
+            link_file(bake / placed["file"], target / placed["file"])
     write_json(target / DESCRIPTION_NAME, description)
     return description
+
+
+def place_web_bake(bake: Path, target: Path) -> None:
+    """Place a bake as `place_bake` does, with the encodings for web pages and the module that reads RGBM."""
+    description = place_bake(bake, target, encodings=("ktx2", "webp"))
+    if any("webp" in page["encodings"] for page in description["pages"]):
+        write_text(target / "rgbm.js", template("web", "rgbm.js"))
 
 
 def decode_page(bake: Path, file: str) -> DecodedImage:

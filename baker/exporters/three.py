@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from baker.core.export import EXPORTS
-from baker.exporters.common import place_bake, template, write_readme, write_text
+from baker.exporters.common import place_web_bake, template, write_readme, write_text
 
 
 class ThreeExport:
@@ -15,7 +15,7 @@ class ThreeExport:
 
     def write(self, bake: Path, target: Path) -> None:
         """Write the files of the export into `target`."""
-        place_bake(bake, target, encodings=("ktx2",))
+        place_web_bake(bake, target)
         write_text(target / "lightmap.js", template("three", "lightmap.js"))
         write_readme(
             bake,
@@ -32,7 +32,8 @@ class ThreeExport:
             "in cd/m2. The option `{ exposure: x }` multiplies all light by x.",
             uv="TEXCOORD_1, which is `uv1`; a texture needs `channel = 1`.",
             rows="v = 0 is the first row of each file. EXRLoader stores the rows bottom-up, so lightmap.js "
-            "replaces v by 1 - v. For KTX2 pages (encoding `ktx2`, option `{ ktx2: loader }`), v stays.",
+            "replaces v by 1 - v. For the pages of the encodings `ktx2` (option `{ ktx2: loader }`) "
+            "and `webp` (option `{ webp: true }`), v stays.",
         )
 
 

@@ -6,20 +6,15 @@ No time stamp is written, so that equal pixels give equal bytes.
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.encoding import check_size
 from baker.core.errors import InputError
-from baker.io.regular_file import read_regular
-
-if TYPE_CHECKING:
-    from PIL.PngImagePlugin import PngImageFile
+from baker.io.picture_file import open_picture
 
 
 def encode_png(pixels: NDArray[np.unsignedinteger[Any]], text: Mapping[str, str] | None = None) -> bytes:
@@ -64,7 +59,9 @@ def decode_png(path: Path) -> tuple[NDArray[np.unsignedinteger[Any]], dict[str, 
     InputError
         If the file is missing, is no PNG, or has a palette or another unsupported pixel type.
     """
-    with _opened(path) as image:
+    from PIL.PngImagePlugin import PngImageFile
+
+    with open_picture(path, PngImageFile, "PNG") as image:
         image.load()
         if image.mode not in ("L", "RGB", "RGBA", "I;16", "I"):
             raise InputError(f"its pixels are of the kind {image.mode}", file=str(path))
@@ -154,7 +151,9 @@ def decode_palette_png(path: Path, side: int | None = None) -> NDArray[np.uint8]
     InputError
         If the file is missing, is no PNG with a palette, or has another size.
     """
-    with _opened(path) as image:
+    from PIL.PngImagePlugin import PngImageFile
+
+    with open_picture(path, PngImageFile, "PNG") as image:
         if image.mode != "P" or (side is not None and image.size != (side, side)):
             size = "" if side is None else f" of {side} x {side} texels"
             raise InputError(f"the picture has no palette numbers{size}", file=str(path))
@@ -179,28 +178,10 @@ def png_size(path: Path) -> tuple[int, int]:
     InputError
         If the file is missing, is no PNG, or is larger than 16384 x 16384 pixels.
     """
-    with _opened(path) as image:
-        return image.size
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[PngImageFile]:
-    """Yield a PNG whose size is permitted; convert errors about the file to `InputError`."""
-    # `Image.open` would warn about images above 89 million pixels and refuse those above 178 million.
     from PIL.PngImagePlugin import PngImageFile
 
-    try:
-        with PngImageFile(io.BytesIO(read_regular(path))) as image:
-            check_size(path, *image.size)
-            yield image
-    except FileNotFoundError:
-        raise InputError("there is no such file", file=str(path)) from None
-    except (OSError, SyntaxError, ValueError, EOFError) as error:
-        raise InputError(f"this is not a readable PNG image ({_reason(error)})", file=str(path)) from None
-
-
-def _reason(error: Exception) -> str:
-    return str(getattr(error, "strerror", None) or error)
+    with open_picture(path, PngImageFile, "PNG") as image:
+        return image.size
 
 
 def _chunks(text: Mapping[str, str]) -> Any:

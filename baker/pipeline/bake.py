@@ -122,7 +122,7 @@ def _folder(
     """Return the output folder; raise an error before the bake if the result could not be written."""
     if out is None:
         return None
-    check_encodings(settings.encode, channels)
+    check_encodings(settings.encode, channels, settings.resolution)
     check_exports(settings.export, settings.channels)
     scene_path = scene.path if isinstance(scene, Scene) else Path(scene)
     check_out(Path(out), force=force, scene_path=scene_path)

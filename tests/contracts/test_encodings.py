@@ -20,6 +20,7 @@ OPTIONS = {
         for method in ("zip", "piz")
     ],
     "rgbm": [{"rgbm_range": top} for top in (0.5, 34.49, 20000.0)],
+    "webp": [{"rgbm_range": top} for top in (0.5, 34.49)],
 }
 CASES = [
     pytest.param(name, number, options, id=f"{name}-{number}")
@@ -177,10 +178,25 @@ def test_errors_are_sentences(tmp_path, name):
         encoding.decode(path)
 
 
+def test_webp_and_png_hold_the_same_rgbm(tmp_path):
+    pixels = image(ENCODINGS.get("rgbm"), fitted(ENCODINGS.get("rgbm")), 3)
+    stored = []
+    for name in ("rgbm", "webp"):
+        encoding = ENCODINGS.get(name)
+        path = tmp_path / f"a{encoding.suffix}"
+        encoding.encode(path, pixels, options=fitted(encoding), header={})
+        with Image.open(path) as picture:
+            assert picture.mode == "RGBA"
+            stored.append(np.asarray(picture))
+        if name == "webp":
+            assert b"VP8L" in path.read_bytes()[:64], "the lossless kind of WebP"
+    assert np.array_equal(*stored)
+
+
 def test_suffixes_tell_encodings_apart():
     suffixes = [ENCODINGS.get(name).suffix for name in ENCODINGS.names()]
     assert len(set(suffixes)) == len(suffixes)
-    assert {"exr", "hdr", "ktx2", "rgbm", "png8", "png16"} <= set(ENCODINGS.names())
+    assert {"exr", "hdr", "ktx2", "rgbm", "png8", "png16", "webp"} <= set(ENCODINGS.names())
     assert encoding_of("a.png") is None
     assert encoding_of("A.RGBM.PNG") is ENCODINGS.get("rgbm")
 

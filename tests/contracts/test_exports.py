@@ -34,6 +34,8 @@ NAMES = EXPORTS.names()
 # Node names that some engine changes or interprets as an import hint; the first name occurs twice.
 NODES = ["a.b c", "a.b c", "wall-col", "Ünï/cødé: %@", "x" * 80, ""]
 SIZE = 16
+# Encoding for web pages -> suffix.
+WEB = {"ktx2": "ktx2", "webp": "rgbm.webp"}
 
 
 def strip(number):
@@ -176,15 +178,29 @@ def test_web_exports_keep_scene_and_pages(bake, name):
 
 
 @pytest.mark.parametrize("name", ["three", "babylon"])
-def test_web_exports_have_the_ktx2_pages_of_a_bake(tmp_path, name):
-    write_bake(result(tmp_path / "in", export=name, encode="ktx2,hdr"), tmp_path / "out")
+def test_web_exports_have_the_pages_for_the_web(tmp_path, name):
+    made = result(tmp_path / "in", export=name, encode="ktx2,hdr,webp")
+    manifest = write_bake(made, tmp_path / "out")
     folder = tmp_path / "out" / name
     pages = json.loads((folder / "lightmap.json").read_text("utf-8"))["pages"]
-    assert [page["ktx2"] for page in pages] == ["irradiance_0.ktx2", "irradiance_1.ktx2"]
-    for page in pages:
-        for file in (page["ktx2"], page["file"]):
-            assert (folder / file).read_bytes() == (tmp_path / "out" / file).read_bytes()
+    top = float(made.lightmaps["irradiance"].value.max())
+    for number, page in enumerate(pages):
+        files = {key: {"file": f"irradiance_{number}.{end}"} for key, end in WEB.items()}
+        assert page["encodings"] == {
+            "ktx2": {**files["ktx2"], "max": 65408.0},
+            "webp": {**files["webp"], "max": top},
+        }
+        for entry in (page, *page["encodings"].values()):
+            assert (folder / entry["file"]).read_bytes() == (tmp_path / "out" / entry["file"]).read_bytes()
     assert not list(folder.glob("*.hdr"))
+    assert f"{name}/rgbm.js" in {entry["file"] for entry in manifest["files"]}
+
+
+@pytest.mark.parametrize("name", ["three", "babylon"])
+def test_web_exports_without_webp_pages_need_no_module_for_them(bake, name):
+    pages = json.loads((bake[0] / name / "lightmap.json").read_text("utf-8"))["pages"]
+    assert [page["encodings"] for page in pages] == [{}, {}]
+    assert not (bake[0] / name / "rgbm.js").exists()
 
 
 def test_playcanvas_pages_hold_lx_and_objects_their_own_meshes(bake):

@@ -49,7 +49,7 @@ def test_offset_and_scale_of_an_object_are_used(browser, probe, tmp_path):
     [
         (": -object.uv_scale[1]", ": object.uv_scale[1]"),
         ("texture.coordinatesIndex = 1", "texture.coordinatesIndex = 0"),
-        ("texture.level = exposure / Math.PI", "texture.level = exposure"),
+        ("(options.exposure ?? 1) / Math.PI", "options.exposure ?? 1"),
         ("texture.gammaSpace = false; resolve", "texture.gammaSpace = true; resolve"),
         ("lit.useLightmapAsShadowmap = true", "lit.useLightmapAsShadowmap = false"),
     ],

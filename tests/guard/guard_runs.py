@@ -88,7 +88,7 @@ RUNS: dict[str, tuple[str, ...]] = {
         f"ao scenes/crates.glb -o far {_TINY} --ao-samples 8 --ao-distance inf --dtype float --threads 1",
     ),
     "encodings": (
-        f"bake scenes/cornell.glb -o all {_TINY} --encode hdr,ktx2,rgbm,png8,png16 --json",
+        f"bake scenes/cornell.glb -o all {_TINY} --encode hdr,ktx2,rgbm,png8,png16,webp --json",
         f"bake scenes/cornell.glb -o float {_TINY} --dtype float --exr-compression piz --no-denoise",
         f"bake scenes/cornell.glb -o range {_TINY} --encode rgbm --rgbm-range 500",
         *(f"inspect all/{name} --json" for name in ("irradiance_0.exr", "status_0.png", "bake.json")),

@@ -236,8 +236,10 @@ def why_unfit(name: str, channel: ChannelDescription) -> str | None:
     return None
 
 
-def check_encodings(names: tuple[str, ...], channels: Mapping[str, ChannelDescription]) -> None:
-    """Check before a bake that each encoding can hold at least one of the channels.
+def check_encodings(
+    names: tuple[str, ...], channels: Mapping[str, ChannelDescription], resolution: int = 0
+) -> None:
+    """Check before a bake that each encoding can hold at least one of the channels, and pages of this size.
 
     Parameters
     ----------
@@ -245,16 +247,23 @@ def check_encodings(names: tuple[str, ...], channels: Mapping[str, ChannelDescri
         Names of encodings.
     channels : mapping of str to ChannelDescription
         The channels of the bake, by name.
+    resolution : int
+        Width and height of the pages, texels; 0 skips the check of the size.
 
     Raises
     ------
     SettingsError
-        If an encoding is unknown, is EXR, or can hold none of the channels.
+        If an encoding is unknown, is EXR, can hold none of the channels, or cannot hold pages of this size.
     """
     for name in names:
-        encoding_named(name)
+        largest = encoding_named(name).largest
         if name == ALWAYS_WRITTEN:
             raise SettingsError("exr is written in any case; name further formats only", object="encode")
+        if resolution > largest:
+            message = (
+                f"'{name}' holds at most {largest} x {largest} texels; lower `resolution` or use the EXR"
+            )
+            raise SettingsError(message, object="encode")
         reasons = {channel: why_unfit(name, described) for channel, described in channels.items()}
         if None not in reasons.values():
             why = "; ".join(f"{channel}: {reason}" for channel, reason in reasons.items())

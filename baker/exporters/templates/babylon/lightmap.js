@@ -10,35 +10,28 @@
 //   lights    false (default): switch off the lights of the file, because the light maps contain their light
 //   fflate    URL of the fflate script, which Babylon.js needs for ZIP pages; default: Babylon.js uses a CDN
 //   zstd      an initialised ZSTDDecoder of the npm package zstddec: load the KTX2 pages, which need `--encode ktx2`
+//   webp      true: load the WebP pages, which need `--encode webp`
 export async function loadBake(BABYLON, folder, scene, options = {}) {
-  const { exposure = 1, lights = false, fflate, zstd } = options;
+  const { exposure = 1, lights = false, fflate } = options;
   const base = folder.endsWith('/') ? folder : folder + '/';
   if (fflate) BABYLON.ExrLoaderGlobalConfiguration.FFLATEUrl = fflate;
   const bake = await (await fetch(base + 'lightmap.json')).json();
-  if (zstd && bake.pages.some((page) => !page.ktx2)) throw new Error('no KTX2 pages; bake with --encode ktx2');
   const loaded = await BABYLON.SceneLoader.ImportMeshAsync('', base, bake.scene, scene);
   if (!lights) for (const light of loaded.lights) light.setEnabled(false);
   const byNode = new Map(bake.objects.map((object) => [object.node, object]));
-  const textures = new Map();
+  const meshes = loaded.meshes
+    .map((mesh) => ({ mesh, object: byNode.get(nodeIndex(mesh)) }))
+    .filter(({ mesh, object }) => object !== undefined && mesh.material);
+  // Objects with the same page and uv transform share a texture. All pages load at the same time.
+  const keyOf = ({ page, uv_scale, uv_offset }) => [page, ...uv_scale, ...uv_offset].join();
+  const objects = new Map(meshes.map(({ object }) => [keyOf(object), object]));
+  const load = async ([key, object]) => [key, await placedTexture(BABYLON, base, bake, object, scene, options)];
+  const textures = new Map(await Promise.all([...objects].map(load)));
   const materials = new Map();
-  const waiting = [];
-  for (const mesh of loaded.meshes) {
-    const object = byNode.get(nodeIndex(mesh));
-    if (object === undefined || !mesh.material) continue;
-    const key = [object.page, ...object.uv_scale, ...object.uv_offset].join();
-    if (!textures.has(key)) {
-      const page = bake.pages[object.page];
-      const texture = zstd
-        ? await ktx2Texture(BABYLON, base + page.ktx2, zstd, scene)
-        : exrTexture(BABYLON, base + page.file, scene);
-      placeTexture(BABYLON, texture, object, zstd !== undefined);
-      texture.level = exposure / Math.PI;
-      if (!zstd) waiting.push(loadedLinear(BABYLON, texture));
-      textures.set(key, texture);
-    }
+  for (const { mesh, object } of meshes) {
+    const key = keyOf(object);
     mesh.material = litMaterial(mesh.material, textures.get(key), key, exposure, materials);
   }
-  await Promise.all(waiting);
   return { ...loaded, bake, textures };
 }
 
@@ -54,8 +47,28 @@ function nodeIndex(mesh) {
   return undefined;
 }
 
-function exrTexture(BABYLON, url, scene) {
-  return new BABYLON.Texture(url, scene, true, false, BABYLON.Texture.BILINEAR_SAMPLINGMODE);
+// Loads the page of an object, with its uv transform. v = 0 is the first row of a page. Babylon.js stores the rows of an
+// EXR bottom-up, so v is replaced by 1 - v there.
+async function placedTexture(BABYLON, base, bake, object, scene, options) {
+  const texture = await loadPage(BABYLON, base, bake.pages[object.page], scene, options);
+  const topDown = Boolean(options.zstd || options.webp);
+  texture.level = (options.exposure ?? 1) / Math.PI;
+  texture.coordinatesIndex = 1;
+  texture.wrapU = texture.wrapV = BABYLON.Texture.CLAMP_ADDRESSMODE;
+  texture.uScale = object.uv_scale[0];
+  texture.vScale = topDown ? object.uv_scale[1] : -object.uv_scale[1];
+  texture.uOffset = object.uv_offset[0];
+  texture.vOffset = topDown ? object.uv_offset[1] : 1 - object.uv_offset[1];
+  return texture;
+}
+
+function loadPage(BABYLON, base, page, scene, { zstd, webp }) {
+  const name = zstd ? 'ktx2' : webp ? 'webp' : undefined;
+  if (name === undefined) return exrTexture(BABYLON, base + page.file, scene);
+  const encoded = page.encodings[name];
+  if (encoded === undefined) throw new Error(`the bake has no such pages; bake with --encode ${name}`);
+  if (zstd) return ktx2Texture(BABYLON, base + encoded.file, zstd, scene);
+  return rgbmTexture(BABYLON, base + encoded.file, encoded.max, scene);
 }
 
 // Loads a KTX2 page with RGB9E5 texels. Babylon.js itself reads only KTX2 files of Basis Universal.
@@ -70,29 +83,31 @@ async function ktx2Texture(BABYLON, url, zstd, scene) {
   if (format !== 123 || scheme !== 2) throw new Error(`${url} has no RGB9E5 texels with Zstandard compression`);
   const raw = zstd.decode(new Uint8Array(file, uint64(80), uint64(88)), uint64(96));
   const texels = new Uint32Array(raw.buffer, raw.byteOffset, raw.byteLength / 4);
-  const { TEXTUREFORMAT_RGB, TEXTURETYPE_UNSIGNED_INT_5_9_9_9_REV, TEXTURE_BILINEAR_SAMPLINGMODE } = BABYLON.Constants;
+  const { TEXTUREFORMAT_RGB, TEXTURETYPE_UNSIGNED_INT_5_9_9_9_REV } = BABYLON.Constants;
+  return rawTexture(BABYLON, texels, width, height, TEXTUREFORMAT_RGB, TEXTURETYPE_UNSIGNED_INT_5_9_9_9_REV, scene);
+}
+
+async function rgbmTexture(BABYLON, url, top, scene) {
+  const { readRgbm } = await import('./rgbm.js');
+  const { width, height, data } = await readRgbm(url, top, BABYLON.ToHalfFloat);
+  const { TEXTUREFORMAT_RGBA, TEXTURETYPE_HALF_FLOAT } = BABYLON.Constants;
+  return rawTexture(BABYLON, data, width, height, TEXTUREFORMAT_RGBA, TEXTURETYPE_HALF_FLOAT, scene);
+}
+
+function rawTexture(BABYLON, texels, width, height, format, type, scene) {
+  const { TEXTURE_BILINEAR_SAMPLINGMODE } = BABYLON.Constants;
   const texture = new BABYLON.RawTexture(
-    texels, width, height, TEXTUREFORMAT_RGB, scene, false, false, TEXTURE_BILINEAR_SAMPLINGMODE,
-    TEXTURETYPE_UNSIGNED_INT_5_9_9_9_REV,
+    texels, width, height, format, scene, false, false, TEXTURE_BILINEAR_SAMPLINGMODE, type,
   );
   texture.gammaSpace = false;
   return texture;
 }
 
-// v = 0 is the first row of a page. Babylon.js stores the rows of an EXR bottom-up, so v is replaced by 1 - v there.
-function placeTexture(BABYLON, texture, object, topDown) {
-  texture.coordinatesIndex = 1;
-  texture.wrapU = texture.wrapV = BABYLON.Texture.CLAMP_ADDRESSMODE;
-  texture.uScale = object.uv_scale[0];
-  texture.vScale = topDown ? object.uv_scale[1] : -object.uv_scale[1];
-  texture.uOffset = object.uv_offset[0];
-  texture.vOffset = topDown ? object.uv_offset[1] : 1 - object.uv_offset[1];
-}
-
-// Resolves when the page is loaded. The EXR loader marks textures as gamma-encoded, so set them to linear then.
-function loadedLinear(BABYLON, texture) {
+// The EXR loader marks textures as gamma-encoded, so they are set to linear when they are loaded.
+function exrTexture(BABYLON, url, scene) {
+  const texture = new BABYLON.Texture(url, scene, true, false, BABYLON.Texture.BILINEAR_SAMPLINGMODE);
   return new Promise((resolve, reject) => {
-    const done = () => { texture.gammaSpace = false; resolve(); };
+    const done = () => { texture.gammaSpace = false; resolve(texture); };
     if (texture.isReady()) done();
     else texture.onLoadObservable.addOnce(done);
     BABYLON.Texture.OnTextureLoadErrorObservable.add((failed) => {

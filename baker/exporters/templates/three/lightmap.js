@@ -4,7 +4,9 @@
 //   const { gltf } = await loadBake('./three/');
 //   scene.add(gltf.scene);
 
-import { FileLoader, LinearFilter, MeshLambertMaterial, NoColorSpace } from 'three';
+import {
+  DataTexture, DataUtils, FileLoader, HalfFloatType, LinearFilter, MeshLambertMaterial, NoColorSpace, RGBAFormat,
+} from 'three';
 import { EXRLoader } from 'three/addons/loaders/EXRLoader.js';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 
@@ -13,22 +15,34 @@ import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 //   matte     true (default): use MeshLambertMaterial, which shows albedo * E / pi; false: keep the materials
 //   lights    false (default): hide the lights of the file, because the light maps contain their light
 //   ktx2      a KTX2Loader after detectSupport(renderer): load the KTX2 pages, which need `--encode ktx2`
+//   webp      true: load the WebP pages, which need `--encode webp`
 export async function loadBake(folder, options = {}) {
-  const { ktx2 } = options;
   const base = folder.endsWith('/') ? folder : folder + '/';
   const bake = JSON.parse(await new FileLoader().loadAsync(base + 'lightmap.json'));
-  if (ktx2 && bake.pages.some((page) => !page.ktx2)) throw new Error('no KTX2 pages; bake with --encode ktx2');
-  const loader = ktx2 ?? new EXRLoader();
   const [gltf, ...textures] = await Promise.all([
     new GLTFLoader().loadAsync(base + bake.scene),
-    ...bake.pages.map((page) => loader.loadAsync(base + (ktx2 ? page.ktx2 : page.file))),
+    ...bake.pages.map((page) => loadPage(base, page, options)),
   ]);
-  applyLightmaps(gltf, bake, textures, { ...options, topDown: Boolean(ktx2) });
+  applyLightmaps(gltf, bake, textures, { ...options, topDown: Boolean(options.ktx2 || options.webp) });
   return { gltf, bake, textures };
 }
 
+function loadPage(base, page, { ktx2, webp }) {
+  const name = ktx2 ? 'ktx2' : webp ? 'webp' : undefined;
+  if (name === undefined) return new EXRLoader().loadAsync(base + page.file);
+  const encoded = page.encodings[name];
+  if (encoded === undefined) throw new Error(`the bake has no such pages; bake with --encode ${name}`);
+  return ktx2 ? ktx2.loadAsync(base + encoded.file) : loadRgbm(base + encoded.file, encoded.max);
+}
+
+async function loadRgbm(url, top) {
+  const { readRgbm } = await import('./rgbm.js');
+  const { width, height, data } = await readRgbm(url, top, DataUtils.toHalfFloat);
+  return new DataTexture(data, width, height, RGBAFormat, HalfFloatType);
+}
+
 // Assigns light maps to the objects of a loaded glTF. Set the option `topDown` if the textures have the first row of
-// the files at v = 0, as those of KTX2Loader have; textures of EXRLoader have the last row there.
+// the files at v = 0, as those of KTX2Loader have. Textures of EXRLoader have the last row there.
 export function applyLightmaps(gltf, bake, textures, options = {}) {
   const { exposure = 1, matte = true, lights = false, topDown = false } = options;
   const byNode = new Map(bake.objects.map((object) => [object.node, object]));

@@ -321,7 +321,11 @@ def test_an_encoding_that_no_channel_fits_is_refused() -> None:
         (("hdr",), ao, "three"),
         (("png16",), light, "one component"),
         (("exr",), ao, "in any case"),
-        (("jpeg",), ao, "known are hdr, ktx2, png16, png8, rgbm"),
+        (("jpeg",), ao, "known are hdr, ktx2, png16, png8, rgbm, webp"),
     ]:
         with pytest.raises(SettingsError, match=words):
             check_encodings(names_, components)
+    check_encodings(("ktx2", "webp"), light, 16383)
+    check_encodings(("ktx2", "rgbm"), light, 16384)
+    with pytest.raises(SettingsError, match="'webp' holds at most 16383 x 16383 texels"):
+        check_encodings(("webp",), light, 16384)
