@@ -20,6 +20,8 @@ from baker.io.picture_file import open_picture
 # Largest width and height of a WebP picture, pixels.
 WEBP_LARGEST = 16383
 _DESCRIPTION = 0x010E
+# `exact` keeps the colours of transparent pixels. In lossless files, `quality` is the effort.
+_LOSSLESS: dict[str, Any] = {"lossless": True, "exact": True, "quality": 50, "method": 4}
 
 
 def encode_webp(pixels: NDArray[np.uint8], text: Mapping[str, str]) -> bytes:
@@ -42,10 +44,7 @@ def encode_webp(pixels: NDArray[np.uint8], text: Mapping[str, str]) -> bytes:
     exif = Image.Exif()
     exif[_DESCRIPTION] = json.dumps(dict(text), sort_keys=True)
     stream = io.BytesIO()
-    # `exact` keeps the colours of transparent pixels. In lossless files, `quality` is the effort.
-    Image.fromarray(pixels).save(
-        stream, "WEBP", lossless=True, exact=True, quality=50, method=4, exif=exif.tobytes()
-    )
+    Image.fromarray(pixels).save(stream, "WEBP", exif=exif.tobytes(), **_LOSSLESS)
     return stream.getvalue()
 
 
