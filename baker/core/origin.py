@@ -102,8 +102,26 @@ def _median_and_spread(position: NDArray[np.float32]) -> tuple[NDArray[np.float6
     some = position[:: max(1, len(position) // _VERTICES)].astype(np.float64)
     if not len(some):
         return np.zeros(3), np.zeros(3)
-    middle = np.median(some, axis=0)
-    half = np.median(np.abs(some - middle), axis=0)
+    middle = column_medians(some)
+    half = column_medians(np.abs(some - middle))
     if not half.any():
         half = 0.5 * np.ptp(some, axis=0)
     return middle, half
+
+
+def column_medians(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the median of each column, as `np.median`, which takes ten times as long for a few rows.
+
+    Parameters
+    ----------
+    rows : (n, k) float64
+        At least one row.
+
+    Returns
+    -------
+    (k,) float64
+        The medians; NaN for columns with NaN.
+    """
+    ordered = np.sort(rows, axis=0)  # NaN come last
+    middle = (ordered[(len(rows) - 1) // 2] + ordered[len(rows) // 2]) / 2.0
+    return np.where(np.isnan(ordered[-1]), np.nan, middle)

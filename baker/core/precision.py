@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.atlas import Atlas
+from baker.core.origin import column_medians
 from baker.core.scene import Scene, SceneWarning
 
 # Spacing of float32 positions, as a share of a texel's side, above which an object is reported.
@@ -119,7 +120,7 @@ def _median_and_extent(position: NDArray[np.float32]) -> tuple[NDArray[np.float6
     some = position[:: max(1, len(position) // _VERTICES)].astype(np.float64)
     if not len(some):
         return np.zeros(3), np.zeros(3)
-    return np.median(some, axis=0), np.quantile(np.abs(some), 1.0 - _OUTLIERS, axis=0)
+    return column_medians(some), np.quantile(np.abs(some), 1.0 - _OUTLIERS, axis=0)
 
 
 def _float32_spacing(value: NDArray[np.float64] | float) -> NDArray[np.float64]:

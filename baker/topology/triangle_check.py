@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.topology.unique_rows import mix, unique_rows
+from baker.topology.unique_rows import FEW, byte_rows, mix, unique_rows
 
 # Largest absolute coordinate of a usable vertex. The limit of Embree is 1.8e18.
 LARGEST_COORDINATE = 1e18
@@ -175,6 +177,11 @@ def duplicates(
 
 def _same_key(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the indices, ascending, of triangles that share a hash of their corner positions."""
+    if len(triangle) <= FEW:
+        rows = byte_rows(position[triangle.ravel()] + np.float32(0.0))
+        keys = [tuple(sorted(rows[k : k + 3])) for k in range(0, len(rows), 3)]
+        times = Counter(keys)
+        return np.array([k for k, key in enumerate(keys) if times[key] > 1], np.int64)
     with np.errstate(invalid="ignore"):
         bits = (position + np.float32(0.0)).view(np.uint32).astype(np.uint64)  # + 0 makes -0 equal to 0
     key = np.zeros(len(bits), np.uint64)

@@ -11,6 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+# Number of rows up to which a dictionary is faster than NumPy: scenes may have many small meshes.
+FEW = 64
+
 
 def first_equal(column: Sequence[NDArray[np.generic]], n_rows: int) -> NDArray[np.int64]:
     """Return for each row the index of the first row that equals it, bit for bit.
@@ -29,6 +32,11 @@ def first_equal(column: Sequence[NDArray[np.generic]], n_rows: int) -> NDArray[n
     """
     if n_rows == 0:
         return np.zeros(0, np.int64)
+    if n_rows <= FEW:
+        parts = [byte_rows(array) for array in column]
+        rows = [b"".join(row) for row in zip(*parts, strict=True)] if parts else [b""] * n_rows
+        index_of: dict[bytes, int] = {}
+        return np.array([index_of.setdefault(row, k) for k, row in enumerate(rows)], np.int64)
     data = [_words(array) for array in column]
     key = np.zeros(n_rows, np.uint64)
     for words in data:
@@ -70,6 +78,24 @@ def unique_rows(
     equal = first_equal(column, n_rows)
     is_first = equal == np.arange(n_rows)
     return np.flatnonzero(is_first), (np.cumsum(is_first) - 1)[equal]
+
+
+def byte_rows(array: NDArray[np.generic]) -> list[bytes]:
+    """Return the bytes of each row of an array.
+
+    Parameters
+    ----------
+    array : (N, any) array
+        Few rows, because one Python object is made for each.
+
+    Returns
+    -------
+    list of bytes
+        N items.
+    """
+    whole = np.ascontiguousarray(array).tobytes()
+    width = len(whole) // max(len(array), 1)
+    return [whole[k * width : (k + 1) * width] for k in range(len(array))]
 
 
 def _words(array: NDArray[np.generic]) -> NDArray[np.uint64]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.topology.unique_rows import unique_rows
+from baker.topology.unique_rows import FEW, unique_rows
 
 
 def weld(*key: NDArray[np.floating]) -> NDArray[np.int32]:
@@ -174,6 +174,10 @@ def number_by_first(label: NDArray[np.integer]) -> NDArray[np.int32]:
     (N,) int32
         New labels; -1 for negative labels.
     """
+    if len(label) <= FEW:
+        number: dict[int, int] = {}
+        few = [number.setdefault(k, len(number)) if k >= 0 else -1 for k in label.tolist()]
+        return np.array(few, np.int32)
     known, first, inverse = np.unique(label, return_index=True, return_inverse=True)
     order = np.argsort(first, kind="stable")
     order = order[known[order] >= 0]

@@ -29,6 +29,8 @@ _ROUNDS = 4
 COPLANAR, LEAST, MOST = 1e-6, 1e-6, 1e-3
 # Components of plane normals are rounded to multiples of 1 / _TURN before they are compared.
 _TURN = 256.0
+# Number of faces of a mesh up to which all pairs of faces are compared before a ray tree is built.
+_FEW_FACES = 64
 
 
 @check(
@@ -61,9 +63,9 @@ def _crossings(facts: MeshFacts, threads: int) -> tuple[NDArray[np.int64], int]:
     """
     from baker.trace.embree import RayScene
 
-    edges = facts.edges
-    if len(facts.sheet) < 2:
+    if len(facts.sheet) < 2 or (len(facts.good) <= _FEW_FACES and not _may_cross(facts)):
         return np.zeros((0, 2), np.int64), 0
+    edges = facts.edges
     face, corner = facts.sheet[edges.face[edges.first]], edges.corner[edges.first]
     begin = facts.corner[face, corner]
     end = facts.corner[face, (corner + 1) % 3]
@@ -92,6 +94,18 @@ def _crossings(facts: MeshFacts, threads: int) -> tuple[NDArray[np.int64], int]:
     tree.close()
     pairs = np.sort(np.concatenate(out), axis=1)
     return np.unique(pairs, axis=0), int(piercing.sum())
+
+
+def _may_cross(facts: MeshFacts) -> bool:
+    """Return whether boxes of two faces overlap that have at most one welded vertex in common.
+
+    Each edge of a face has an end in all faces that share two of its vertices, and is no crossing there.
+    """
+    low, high = facts.corner.min(axis=1), facts.corner.max(axis=1)
+    gap = _DEPTH * float((high.max(axis=0) - low.min(axis=0)).max())
+    overlap = ((low[:, None] <= high[None] + gap) & (high[:, None] >= low[None] - gap)).all(axis=2)
+    common = (facts.welded[:, None, :, None] == facts.welded[None, :, None, :]).any(axis=3).sum(axis=2)
+    return bool((overlap & (common < 2)).any())
 
 
 def _pierces(
