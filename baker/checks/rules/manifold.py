@@ -134,6 +134,8 @@ def open_edges(context: CheckContext) -> Iterator[RawFinding]:
         missing = np.bincount(of, area, facts.n_pieces)
         whole = np.bincount(facts.piece, facts.area[facts.sheet], facts.n_pieces)
         leaky = missing < MOST_OPEN * np.maximum(whole, 1e-300)
+        if not leaky.any():
+            continue
         shown = context.first_instance.get(m)
         up = np.array([0.0, 1.0, 0.0]) if shown is None else shown.world_from_object[1, :3]
         meant = _missing_bottoms(facts, border, hole, area, up)

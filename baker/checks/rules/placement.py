@@ -24,12 +24,14 @@ SMALLEST, LARGEST = 0.05, 5000.0
 def _stretches(
     context: CheckContext,
 ) -> Iterator[tuple[Location, np.ndarray, float, tuple[float, float, float]]]:
-    for instance in context.source.instances:
-        matrix = instance.world_from_object[:3, :3]
-        stretch = np.linalg.svd(matrix, compute_uv=False)
+    instances = context.source.instances
+    # One call for all matrices: a call for each takes 0.1 ms.
+    matrices = np.array([instance.world_from_object[:3, :3] for instance in instances]).reshape(-1, 3, 3)
+    stretches, turns = np.linalg.svd(matrices, compute_uv=False), np.linalg.det(matrices)
+    for instance, stretch, turn in zip(instances, stretches, turns.tolist(), strict=True):
         x, y, z = (float(v) for v in instance.world_from_object[:3, 3])
         location = Location(instance.name or context.source.meshes[instance.mesh].name, instance.node)
-        yield location, stretch, float(np.linalg.det(matrix)), (x, y, z)
+        yield location, stretch, turn, (x, y, z)
 
 
 @check(
