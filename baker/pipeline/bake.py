@@ -157,10 +157,7 @@ def _trace(
     executor: TileExecutor,
     compiling: precompile.Process,
 ) -> TracedTexels:
-    """Run the ray stages, and return only the results that `finish_pages` reads.
-
-    All other arrays are freed. For a page of 4096 texels a side, they occupy 1 GB.
-    """
+    """Run the ray stages, and return only the results that `finish_pages` reads; other arrays are freed."""
     executor.open(scene, atlas, settings)
     prepared = prepare_scene(scene, atlas, settings, record)
     if any(channel.needs_light for channel in channels.values()):
@@ -172,7 +169,8 @@ def _trace(
     valid = prepared.job.valid_points[: texels.n_front] != 0
     # Half floats are precise enough for the suggested exposure and take half of the memory.
     albedo = prepared.texels.albedo[: texels.n_front].astype(np.float16)
-    return TracedTexels(texels, valid, albedo, transport)
+    layers = {name: channel.layers(transport) for name, channel in channels.items()}
+    return TracedTexels(texels, valid, albedo, layers)
 
 
 def _write(result: BakeResult, folder: Path, force: bool, record: Record) -> BakeResult:

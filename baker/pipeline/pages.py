@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.channels.channel import Channel, Layer, Transport, make_lightmap
+from baker.channels.channel import Channel, Layer, make_lightmap
 from baker.core.atlas import Atlas
 from baker.core.lightmap import BakeResult, TexelStatus
 from baker.core.parallel import thread_count
@@ -40,13 +40,13 @@ class TracedTexels(NamedTuple):
     texels : TexelBuffer
     valid : (n_front,) bool, whether a front texel has a valid point
     albedo : (n_front, 3) float16, linear Rec.709
-    transport : Transport, values of the front texels
+    layers : mapping of str to tuple of Layer, the layers of each channel for the front texels
     """
 
     texels: TexelBuffer
     valid: NDArray[np.bool_]
     albedo: NDArray[np.float16]
-    transport: Transport
+    layers: Mapping[str, tuple[Layer, ...]]
 
 
 def finish_pages(
@@ -83,9 +83,9 @@ def finish_pages(
     n_front = texels.n_front
     chart = texels.page_image(texels.chart[:n_front], fill=-1)
     status = np.where(chart >= 0, np.uint8(TexelStatus.COVERED), np.uint8(TexelStatus.EMPTY))
-    layers = {name: channel.layers(traced.transport) for name, channel in channels.items()}
+    layers = traced.layers
     with record.stage(Stage.FINISH):
-        value = _finished(traced, channels, layers, settings, record.progress, status)
+        value = _finished(traced, channels, settings, record.progress, status)
         noisy = np.zeros(n_front, bool)
         for name, channel in channels.items():
             noisy |= _unconverged(layers[name], texels.chart[:n_front], channel.signed)
@@ -148,7 +148,6 @@ def convergence_warnings(status: NDArray[np.uint8]) -> list[SceneWarning]:
 def _finished(
     traced: TracedTexels,
     channels: Mapping[str, Channel],
-    layers: Mapping[str, tuple[Layer, ...]],
     settings: BakeSettings,
     progress: Progress,
     status: NDArray[np.uint8],
@@ -175,7 +174,7 @@ def _finished(
         for page in range(len(status)):
             plan = PagePlan(region[page], valid[page], centroid[page])
             for name, channel in channels.items():
-                images = [_page_layer(texels, layer, page) for layer in layers[name]]
+                images = [_page_layer(texels, layer, page) for layer in traced.layers[name]]
                 rules = ComponentRules(channel.lower, channel.upper, channel.groups)
                 value[name][page], grown = finish_page(plan, images, rules, finisher)
                 status[page][grown] = TexelStatus.DILATED
