@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from baker.core.atlas import Atlas, InstanceLayout
 from baker.core.lightmap import BakeResult
 from baker.core.scene import Scene
 from baker.core.settings import make_settings
+from baker.io.bake.write_bake import write_bake
 from baker.io.load import load_scene
 from baker.io.png import encode_png
 
@@ -158,3 +160,11 @@ def quad_result(folder: Path, **settings: object) -> BakeResult:
             "energy": {"emitted": np.ones(3), "absorbed": np.full(3, 0.75), "escaped": np.full(3, 0.25)},
         },
     )  # fmt: skip
+
+
+def write_timed_bake(out: Path, n_texels: int, **members: object) -> None:
+    """Write a bake of the unit square into `out`, with the given members of its manifest."""
+    write_bake(quad_result(out.parent / f"source of {out.name}"), out)
+    manifest = json.loads((out / "bake.json").read_text("utf-8"))
+    manifest["instances"][0]["texels"] = n_texels
+    (out / "bake.json").write_text(json.dumps(manifest | members), "utf-8")

@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from gltf_builder import QUAD, GltfBuilder, quad_builder, write
+from io_scenes import write_timed_bake
 
 ROOT = Path(__file__).parents[2]
 sys.path.append(str(ROOT / "tests" / "unit" / "checks"))
@@ -184,14 +185,10 @@ def test_a_bake_tells_of_parts_inside_out(tmp_path):
 
 
 def test_cost_by_the_speed_of_a_bake(tmp_path):
-    manifest = {
-        "timings": {"final gather": 2.0, "ambient occlusion": 2.0, "finish": 1.0},
-        "rays": {"final gather": 1_000_000},
-        "instances": [{"texels": 10_000}],
-    }
-    (tmp_path / "bake.json").write_text(json.dumps(manifest))
+    timings = {"final gather": 2.0, "ambient occlusion": 2.0, "finish": 1.0}
+    write_timed_bake(tmp_path / "out", 10_000, timings=timings, rays={"final gather": 1_000_000})
     path = write(tmp_path / "scene.glb", quad_builder())
-    arguments = ["--resolution", 64, "--channels", "ao", "--ao-samples", 10, "--rates", tmp_path]
+    arguments = ["--resolution", 64, "--channels", "ao", "--ao-samples", 10, "--rates", tmp_path / "out"]
     _, result = check(path, *arguments)
     cost = next(f for f in result["findings"] if f["code"] == "cost")
     texels = round(0.8 * 64 * 64)
@@ -202,16 +199,13 @@ def test_cost_by_the_speed_of_a_bake(tmp_path):
 
 
 def bake_beside(scene, name, seconds, *, of=None, created="2026-01-01T00:00:00Z", **more):
-    folder = scene.parent / name
-    folder.mkdir()
-    manifest = {
-        "input": {"path": f"../{of or scene.name}"},
+    members = {
+        "input": {"path": f"../{of or scene.name}", "sha256": None},
         "created": created,
         "timings": {"ambient occlusion": seconds},
         "rays": {"ambient occlusion": 1_000_000},
-        "instances": [{"texels": 10_000}],
     }
-    (folder / "bake.json").write_text(json.dumps(manifest | more))
+    write_timed_bake(scene.parent / name, 10_000, **members | more)
 
 
 def test_cost_by_the_speed_of_the_latest_bake_beside_the_scene(tmp_path):

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
+from io_scenes import write_timed_bake
 
 from baker.checks.bake_rates import RAY_STAGES
 from baker.checks.stage_seconds import stage_seconds
@@ -69,16 +68,14 @@ def test_expected_seconds_have_the_stages_of_the_settings_in_their_order(tmp_pat
 
 def test_the_speed_of_an_earlier_bake_of_the_scene_is_used(tmp_path) -> None:
     scene = tmp_path / "a.glb"
-    (tmp_path / "out").mkdir()
-    manifest = {
-        "input": {"path": "../a.glb"},
-        "created": "2026-01-01",
-        "timings": {"final gather": 5.0, "finish": 2.0},
-        "rays": {"final gather": 1000},
-        "instances": [{"texels": 100}],
-    }
     default = stage_seconds(BakeSettings(), scene)
-    (tmp_path / "out" / "bake.json").write_text(json.dumps(manifest))
+    write_timed_bake(
+        tmp_path / "out",
+        100,
+        input={"path": "../a.glb", "sha256": None},
+        timings={"final gather": 5.0, "finish": 2.0},
+        rays={"final gather": 1000},
+    )
     found = stage_seconds(BakeSettings(), scene)
     texels = 0.8 * 1024**2
     assert found[Stage.FINAL_GATHER] == pytest.approx(texels * 64 * 0.005, rel=1e-3)
