@@ -176,8 +176,8 @@ def number_by_first(label: NDArray[np.integer]) -> NDArray[np.int32]:
     """
     if len(label) <= FEW:
         number: dict[int, int] = {}
-        few = [number.setdefault(k, len(number)) if k >= 0 else -1 for k in label.tolist()]
-        return np.array(few, np.int32)
+        numbered = [number.setdefault(k, len(number)) if k >= 0 else -1 for k in label.tolist()]
+        return np.array(numbered, np.int32)
     known, first, inverse = np.unique(label, return_index=True, return_inverse=True)
     order = np.argsort(first, kind="stable")
     order = order[known[order] >= 0]
