@@ -54,7 +54,9 @@ def encode_exr(
     Parameters
     ----------
     path : Path
-    pixels : (H, W, C) float32, row 0 on top, 1 to 16 components
+        File to write; replaced if it exists.
+    pixels : (H, W, C) float32
+        Row 0 on top, 1 to 16 components.
     half : bool
         True for 16-bit floats, False for 32-bit floats.
     compression : str

@@ -141,7 +141,7 @@ def test_the_docs_name_every_file(bake, name):
     rows = re.search(r"^\| file in .*?\n\n", page, re.DOTALL | re.MULTILINE).group()
     first = " ".join(row.split("|")[1] for row in rows.splitlines()[2:] if row)
     found = {p.relative_to(bake[0] / name).as_posix() for p in (bake[0] / name).rglob("*") if p.is_file()}
-    files = {re.sub(r"irradiance_\d+", "irradiance_N", file) for file in found}
+    files = {re.sub(r"(irradiance|lightmap)_\d+", r"\1_N", file) for file in found}
     assert set(re.findall(r"`(.+?)`", first)) == files
 
 
@@ -232,8 +232,8 @@ def test_engines_that_go_by_names_get_a_name_for_each_node(bake, name):
         assert new["meshes"][node["mesh"]]["name"] == node["name"]
     found = json.loads((out / name / "lightmap.json").read_text("utf-8"))["objects"]
     assert [entry["name"] for entry in found] == names
-    if name == "unity":
-        # Unity would multiply the lightmap by the occlusion texture, and the pages contain occlusion.
+    if name in ("godot", "unity"):
+        # These engines would multiply the lightmap by the occlusion texture, and the pages contain occlusion.
         for material in old["materials"]:
             del material["occlusionTexture"]
     if name == "unreal":
@@ -329,13 +329,59 @@ def test_bevy_exposure_values():
     assert ev100(None) == 9.7
 
 
-def test_godot_shaders_read_uv2_and_divide_by_pi():
-    for name, pi in (("lightmap.gdshader", "PI"), ("godot3/lightmap.shader", "3.14159265359")):
+def test_godot_images_hold_scaled_pages_one_below_the_other(bake):
+    """Godot multiplies a lightmap by the albedo and by nothing else."""
+    folder = bake[0] / "godot"
+    pages = [decode_exr(bake[0] / f"irradiance_{page}.exr").pixels for page in range(2)]
+    image = decode_exr(folder / "lightmap_0.exr")
+    assert image.pixels == pytest.approx(np.concatenate(pages) / math.pi * 0.0625, rel=2**-10)
+    assert (image.dtype, image.header["exposure"]) == ("half", "0.0625")
+    found = json.loads((folder / "lightmap.json").read_text("utf-8"))
+    assert found["exposure"] == 0.0625
+    assert found["textures"] == [{"file": "lightmap_0.exr", "slices": 2}]
+    size = {"width": SIZE, "height": SIZE}
+    assert found["pages"] == [{"file": "lightmap_0.exr", **size, "slice": i, "slices": 2} for i in range(2)]
+    assert "slices/vertical=2\n" in (folder / "lightmap_0.exr.import").read_text("utf-8")
+
+
+def test_godot_pages_that_exceed_an_image_go_into_the_next(bake, tmp_path, monkeypatch):
+    monkeypatch.setattr("baker.exporters.godot.MAX_ROWS", SIZE)
+    EXPORTS.require("godot", "export").write(bake[0], tmp_path)
+    whole = decode_exr(bake[0] / "godot" / "lightmap_0.exr").pixels
+    for number, half in enumerate(np.split(whole, 2)):
+        name = f"lightmap_{number}.exr"
+        assert np.array_equal(decode_exr(tmp_path / name).pixels, half)
+        assert "slices/vertical=1\n" in (tmp_path / f"{name}.import").read_text("utf-8")
+        assert (tmp_path / "godot3" / f"{name}.import").is_file()
+    found = json.loads((tmp_path / "lightmap.json").read_text("utf-8"))
+    assert [(page["file"], page["slice"]) for page in found["pages"]] == [
+        ("lightmap_0.exr", 0),
+        ("lightmap_1.exr", 0),
+    ]
+
+
+def test_godot_without_a_suggested_exposure_keeps_the_scale(tmp_path):
+    made = replace(result(tmp_path / "in", export=("godot",)), suggested_exposure=None)
+    write_bake(made, tmp_path / "out")
+    folder = tmp_path / "out" / "godot"
+    assert json.loads((folder / "lightmap.json").read_text("utf-8"))["exposure"] == 1.0
+    assert "E / pi x 1 (`exposure`)" in (folder / "README.md").read_text("utf-8")
+
+
+def test_godot_imports_the_scene_with_the_script_beside_it(bake):
+    text = (bake[0] / "godot" / "scene.glb.import").read_text("utf-8")
+    assert 'import_script/path="import_scene.gd"' in text
+    # 2 would replace the second uv set.
+    assert "meshes/light_baking=1\n" in text
+
+
+def test_godot_shaders_decode_no_page(bake):
+    """A page has no hint that would make Godot decode it as sRGB."""
+    for name in ("fallback/lightmap.gdshader", "godot3/lightmap.shader"):
         source = template("godot", name)
-        assert "texture(page, UV2 * uv_scale + uv_offset).rgb" in source
-        assert f"base * irradiance / {pi} + emitted" in source
-        # The page has no hint that would make Godot decode it as sRGB.
-        assert not re.search(r"sampler2D page\s*:.*(source_color|hint_albedo)", source)
+        assert "UV2 * uv_scale + uv_offset" in source
+        assert re.search(r"uniform sampler2D(Array)? pages\b", source)
+        assert not re.search(r"pages\s*:.*(source_color|hint_albedo)", source)
 
 
 def test_unlit_holds_light_times_albedo(bake, tmp_path):

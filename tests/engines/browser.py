@@ -43,9 +43,9 @@ def need_program(name: str, package: str) -> str:
     return found
 
 
-def need_modules() -> Path:
-    """Return the `node_modules` folder of the browser libraries; if it is missing, fail with advice."""
-    if not (NODE_MODULES / "three" / "package.json").is_file():
+def need_modules(name: str = "three") -> Path:
+    """Return the `node_modules` folder of the browser libraries; if it lacks `name`, fail with advice."""
+    if not (NODE_MODULES / name / "package.json").is_file():
         pytest.fail("the browser libraries are not installed: run 'npm install' in tests/engines")
     return NODE_MODULES
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from gltf_builder import GltfBuilder, write
@@ -87,7 +88,7 @@ def write_probe(
     *,
     page: np.ndarray | None = None,
     builder: GltfBuilder | None = None,
-    **settings: object,
+    **settings: Any,
 ) -> Path:
     """Write the probe as a bake with these exports and return the output folder.
 
@@ -98,7 +99,13 @@ def write_probe(
 
 
 def write_made_up(
-    folder: Path, builder: GltfBuilder, light: np.ndarray, exports: str, **settings: object
+    folder: Path,
+    builder: GltfBuilder,
+    light: np.ndarray,
+    exports: str,
+    *,
+    suggested_exposure: float | None = None,
+    **settings: Any,
 ) -> Path:
     """Write a bake with this irradiance, a page for each object, and return the output folder."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -115,6 +122,7 @@ def write_made_up(
         },
         status=np.ones((count, SIZE, SIZE), np.uint8),
         texel_count=np.full(count, SIZE * SIZE),
+        suggested_exposure=suggested_exposure,
     )
     write_bake(result, folder / "out")
     return folder / "out"

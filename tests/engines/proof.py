@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import shutil
+import struct
 from pathlib import Path
 from urllib.parse import urlencode
 
 import numpy as np
 from browser import need_modules, run, serve
-from engine_scenes import MIDDLE, ROOM_RADIANCE, probe_expected
+from engine_scenes import ALBEDO, MIDDLE, ROOM_RADIANCE, probe_expected
+from gltf_builder import pack_glb
 
 PAGES = Path(__file__).parent / "pages"
 
@@ -61,3 +63,54 @@ def lower_left_quarter(folder, target):
     bake["objects"][0] |= {"uv_scale": [0.5, 0.5], "uv_offset": [0.0, 0.5]}
     path.write_text(json.dumps(bake), "utf-8")
     return target
+
+
+def curve(linear):
+    """Return the sRGB numbers of linear light, 0 to 1."""
+    return np.where(linear > 0.0031308, 1.055 * linear ** (1 / 2.4) - 0.055, 12.92 * linear)
+
+
+def light_in_codes(code, exposures, lowest, offset=0.0):
+    """Return the light that 8-bit pictures of one scene show.
+
+    Parameters
+    ----------
+    code : (E, ...) float64
+        sRGB codes, one picture for each exposure.
+    exposures : list of float
+        Factor on the light in each picture.
+    lowest : int
+        The result is the mean over the pictures in which the code is between `lowest` and 250.
+    offset : float
+        A code c represents the light of (c + offset) / 255: 0 if the renderer rounds, 0.5 if it truncates.
+    """
+    level = (code + offset) / 255.0
+    linear = np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4)
+    good = (code >= lowest) & (code <= 250)
+    factor = np.reshape(exposures, (-1,) + (1,) * (code.ndim - 1))
+    return (linear / factor * good).sum(axis=0) / np.maximum(good.sum(axis=0), 1)
+
+
+def edited(folder, target, edit):
+    """Copy an export to `target`, call `edit` with the document of its scene.glb, and return the copy."""
+    shutil.copytree(folder, target)
+    path = target / "scene.glb"
+    data = path.read_bytes()
+    (length,) = struct.unpack_from("<I", data, 12)
+    document = json.loads(data[20 : 20 + length])
+    edit(document)
+    # A copied file may be a link to a file of the bake.
+    path.unlink()
+    path.write_bytes(pack_glb(document, data[28 + length :]))
+    return target
+
+
+def with_material(alpha=1.0, **members):
+    """Return an edit of a probe's document that sets alpha and members of all materials."""
+
+    def edit(document):
+        for material in document["materials"]:
+            material |= members
+            material["pbrMetallicRoughness"]["baseColorFactor"] = [*ALBEDO, alpha]
+
+    return edit

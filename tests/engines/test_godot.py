@@ -19,7 +19,17 @@ import numpy as np
 import pytest
 from browser import need_program
 from engine_scenes import QUADRANT, probe_expected, srgb_page, write_probe
-from proof import changed, lower_left_quarter, middles, shows_something_else, shows_the_probe, shows_the_room
+from proof import (
+    changed,
+    edited,
+    light_in_codes,
+    lower_left_quarter,
+    middles,
+    shows_something_else,
+    shows_the_probe,
+    shows_the_room,
+    with_material,
+)
 
 pytestmark = pytest.mark.engines_by_hand
 PROJECT = Path(__file__).parent / "godot3"
@@ -52,12 +62,12 @@ def imported(project, environment):
 def draw(folder, tmp_path, camera="front", exposures=EXPOSURES):
     """Import an export with the editor, draw it, and return the (64, 64, 3) picture, row 0 on top."""
     project = tmp_path / "project"
+    tmp_path.mkdir(exist_ok=True)
     shutil.copytree(PROJECT, project)
-    shutil.copytree(folder, project / "godot")
-    # Follow the steps of the README for Godot 3.
-    for path in sorted((project / "godot" / "godot3").glob("lightmap*")):
-        path.replace(project / "godot" / path.name)
-    (project / "godot" / "import_scene.gd").unlink()
+    # Follow the steps of the docs for Godot 3.
+    shutil.copytree(folder / "godot3", project / "godot", ignore=shutil.ignore_patterns(".gdignore"))
+    for path in [folder / "scene.glb", folder / "lightmap.json", *folder.glob("lightmap_*.exr")]:
+        shutil.copy(path, project / "godot")
     (project / "task.json").write_text(json.dumps({"camera": camera, "exposures": exposures}), "utf-8")
     # Godot stores its settings in the home folder.
     environment = {**os.environ, "HOME": str(tmp_path)}
@@ -70,12 +80,9 @@ def draw(folder, tmp_path, camera="front", exposures=EXPOSURES):
     assert result.exists(), told[-3000:]
     assert "SCRIPT ERROR" not in told, told[-3000:]
     code = np.array(json.loads(result.read_text("utf-8")), float).reshape(-1, 64, 64, 3)
-    # Godot truncates, so a code represents the interval from code / 255 to (code + 1) / 255.
-    level = (code + 0.5) / 255.0
-    linear = np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4)
-    good = (code >= 120) & (code <= 250)
-    total = (linear / np.array(exposures)[:, None, None, None] * good).sum(axis=0)
-    return total / np.maximum(good.sum(axis=0), 1)
+    exposure = json.loads((folder / "lightmap.json").read_text("utf-8"))["exposure"]
+    # Godot 3 truncates.
+    return light_in_codes(code, exposures, 120, 0.5) / exposure
 
 
 def test_the_probe_is_shown(probe, tmp_path):
@@ -93,14 +100,24 @@ def test_offset_and_scale_of_an_object_are_used(probe, tmp_path):
     assert shows_the_probe(picture, expected), middles(picture)
 
 
+def test_alpha_and_cull_mode_of_materials_are_used(probe, tmp_path):
+    mask = edited(probe / "godot", tmp_path / "mask", with_material(0.25, alphaMode="MASK", alphaCutoff=0.5))
+    assert draw(mask, tmp_path / "a").max() == 0.0
+    assert draw(probe / "godot", tmp_path / "b", "back").max() == 0.0
+    double = edited(probe / "godot", tmp_path / "double", with_material(doubleSided=True))
+    picture = draw(double, tmp_path / "c", "back")
+    assert shows_the_probe(picture, probe_expected()[[1, 0, 3, 2]]), middles(picture)
+
+
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
         ("UV2 * uv_scale + uv_offset", "vec2(0.0, 1.0) + vec2(1.0, -1.0) * UV2"),
-        ("texture(page, UV2", "texture(page, UV"),
-        ("/ 3.14159265359", ""),
+        ("UV2 * uv_scale", "UV * uv_scale"),
+        ("+ slice) / slices", "+ slice)"),
+        ("base.rgb * light", "3.14159265359 * base.rgb * light"),
     ],
-    ids=["v turned over", "first uv set", "no pi"],
+    ids=["v turned over", "first uv set", "no layers", "no pi"],
 )
 def test_a_wrong_export_fails(probe, tmp_path, right, wrong):
     copy = changed(probe / "godot", tmp_path / "wrong", "godot3/lightmap.shader", right, wrong)

@@ -8,6 +8,7 @@ import pytest
 from browser import need_program
 
 from baker.exporters.common import template
+from baker.exporters.godot import FILES
 
 pytestmark = pytest.mark.engines
 
@@ -24,6 +25,17 @@ def errors(module, source):
             found.append(node.start_point[0] + 1)
         waiting.extend(node.children)
     return found
+
+
+@pytest.mark.parametrize("name", [name for name in FILES if name.endswith(".gd")])
+def test_gdscript(name):
+    import tree_sitter_gdscript
+
+    source = template("godot", name)
+    assert errors(tree_sitter_gdscript, source) == []
+    assert errors(
+        tree_sitter_gdscript, source.replace("():", "(:", 1).replace("(scene: Node", "(scene: (", 1)
+    )
 
 
 def test_rust(probe):

@@ -7,13 +7,9 @@ import json
 import numpy as np
 import pytest
 from engine_scenes import QUADRANT, ROOM_RADIANCE, probe_expected, srgb_page, write_probe
-from proof import draw, middles, shows_something_else
+from proof import curve, draw, middles, shows_something_else
 
 pytestmark = pytest.mark.engines
-
-
-def curve(linear):
-    return np.where(linear > 0.0031308, 1.055 * linear ** (1 / 2.4) - 0.055, 12.92 * linear)
 
 
 def exposure_of(folder):

@@ -21,12 +21,13 @@ func _ready():
 	view.add_child(scene)
 	var camera = Camera.new()
 	view.add_child(camera)
-	if task["camera"] == "front":
-		camera.set_orthogonal(2.0, 0.1, 10.0)
-		camera.translation = Vector3(0, 0, 2)
-	else:
+	if task["camera"] == "inside":
 		camera.set_perspective(80.0, 0.01, 10.0)
 		camera.look_at_from_position(Vector3(0.2, 0.1, 0.3), Vector3(-1, -0.4, -0.7), Vector3.UP)
+	else:
+		var side = -1 if task["camera"] == "back" else 1
+		camera.set_orthogonal(2.0, 0.1, 10.0)
+		camera.look_at_from_position(Vector3(0, 0, 2 * side), Vector3.ZERO, Vector3.UP)
 	camera.current = true
 	var pictures = []
 	for exposure in task["exposures"]:

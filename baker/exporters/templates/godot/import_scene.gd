@@ -1,10 +1,9 @@
 @tool
 extends EditorScenePostImport
-# Import script for scene.glb (Godot 4): attaches lightmaps.gd to the root of the scene.
+# Import script of scene.glb (Godot 4.2 or newer): adds the lightmaps.
 
 
 func _post_import(scene: Node) -> Object:
 	var folder := get_source_file().get_base_dir()
-	scene.set_script(load(folder.path_join("lightmaps.gd")))
-	scene.set("folder", folder)
+	load(folder.path_join("lightmap_gi.gd")).attach(scene, folder)
 	return scene
