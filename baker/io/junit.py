@@ -27,8 +27,8 @@ class Case:
         Why the case failed; empty if it passed.
     seconds : float
     error : bool
-        True if the case failed for lack of a resource; then `problem` is written as an error and not as a
-        failure.
+        True if a job of a batch failed with exit code 4 (a resource, a crash). `problem` is then written as
+        an error and not as a failure.
     """
 
     name: str

@@ -57,7 +57,7 @@ def decode_png(path: Path) -> tuple[NDArray[np.unsignedinteger[Any]], dict[str, 
     Raises
     ------
     InputError
-        If the file is missing, is no PNG, or has a palette or another unsupported pixel type.
+        If the file is missing, is no PNG, is too large, or has a palette or another unsupported pixel type.
     """
     from PIL.PngImagePlugin import PngImageFile
 

@@ -93,7 +93,7 @@ class ComparedPoints(NamedTuple):
     spread: NDArray[np.float64]
 
     def of(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> ComparedPoints:
-        """Return some of the points, by mask (n,) or by index (m,)."""
+        """Return the points that a mask (n,) or indices (m,) select."""
         halves = self.halves[0][which], self.halves[1][which]
         return ComparedPoints(
             self.value[which], self.reference[which], self.standard_error[which], halves,

@@ -39,7 +39,7 @@ class Record:
 
     @contextmanager
     def stage(self, name: Stage) -> Iterator[None]:
-        """Measure the time of the body and add it to `timings`.
+        """Report the start of a stage, and add the time of the `with` block to `timings`.
 
         Parameters
         ----------

@@ -177,7 +177,7 @@ def _reflected(
     record: Record,
     executor: TileExecutor,
 ) -> NDArray[np.float32]:
-    """Return (n, 3) float32, lx: the radiosity of each entry, which the final gather then reads.
+    """Return (n, 3) float32, lx: the reflected radiosity of each entry, which the final gather then reads.
 
     complete : (n, 3) float32, lx, direct light of each entry
     level : (n,) uint8, how narrow the gap at each entry is, see `baker.radiosity.narrow_gaps.gap_level`

@@ -91,7 +91,7 @@ class RenderSettings(Settings):
             if not self.ao:
                 raise SettingsError("`ao_distance` needs `ao`", object="ao_distance")
             ao_metres(self.ao_distance, 1.0)
-        # The property raises an error for a wrong sky.
+        # The property raises an error for an invalid sky.
         self.sky_radiance  # noqa: B018
         if self.estimator != "mis":
             if self.ao or self.lightmap is not None:

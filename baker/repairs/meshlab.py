@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from baker.core.errors import ResourceError
 
-# Approximate number of points on a surface, or more, at which its distance from another surface is measured.
+# Approximate smallest number of points on a surface at which its distance from another surface is measured.
 _DISTANCE_SAMPLES = 20000
 
 
@@ -122,7 +122,7 @@ def largest_distance(
     """Return the largest distance from points on one surface to another surface.
 
     This is the one-sided Hausdorff distance. It is measured at all vertices of the sampled faces and at
-    points of regular grids on these faces, about `_DISTANCE_SAMPLES` points in total or more.
+    points of regular grids on these faces, in total at about `_DISTANCE_SAMPLES` points or more.
 
     Parameters
     ----------

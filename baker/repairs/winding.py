@@ -24,7 +24,7 @@ _CLEAR = 0.5
 
 @dataclass(frozen=True)
 class Winding:
-    """Faces of a mesh with wrong winding.
+    """The faces of a mesh to flip, and counts of its closed pieces.
 
     Attributes
     ----------

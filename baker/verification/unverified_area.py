@@ -15,7 +15,7 @@ from baker.pathtracer.scene import Reference
 from baker.verification.points import Pages
 from baker.verification.surroundings import visible
 
-# Largest number of invalid texels whose visibility is tested, and number of points for the area of a texel.
+# Largest number of invalid texels whose visibility is tested, and number of points in each texel.
 _TESTED, _POINTS = 400, 4
 
 

@@ -46,8 +46,8 @@ def check_out(out: Path, *, force: bool = False, scene_path: Path | None = None)
     Raises
     ------
     SettingsError
-        If `out` is the root, a file, inside a file, or a path that `resolved_output` refuses. If `out`
-        contains files but no bake, and `force` is False. If the bake would replace the input.
+        If `out` is the root of the file system, is a file or lies in one, or is refused by `resolved_output`.
+        If `out` contains files but no bake, and `force` is False. If the bake would replace the input.
     ResourceError
         If the folder cannot be read or written to.
     """

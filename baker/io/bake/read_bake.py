@@ -1,6 +1,7 @@
 """Reads a finished output folder: scene, lightmap uv, maps, status, manifest.
 
-Verification, comparison and the viewer use `read_bake`, so they work on files and not on arrays in memory.
+Verification, comparison, rendering, exports and the viewer use `read_bake`. They work on files and not on
+arrays in memory.
 """
 
 from __future__ import annotations

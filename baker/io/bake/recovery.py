@@ -28,7 +28,7 @@ _FILE_NAME = re.compile(r"(?!\.{1,2}(/|$))[^/\\:]+(/(?!\.{1,2}(/|$))[^/\\:]+)*")
 
 
 def lies_inside(folder: Path, name: object) -> bool:
-    """Return whether `name` is a printable path in `folder` and no parent folder in it is a symbolic link.
+    """Return whether `name` is a printable path inside `folder` and none of its folders is a symbolic link.
 
     Parameters
     ----------

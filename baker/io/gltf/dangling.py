@@ -1,7 +1,7 @@
 """Keeps invalid references of a glTF document invalid when `Packer` adds data to it.
 
-A view that ends after its buffer, or an index after the end of a list, would become valid when buffers are
-merged and lists grow, and would then refer to other data.
+When buffers are merged and lists grow, a view that ends after its buffer would become valid, and so would an
+index after the end of a list. Both would then refer to other data.
 """
 
 from __future__ import annotations

@@ -79,7 +79,7 @@ class Poser:
         return out, world_from_posed
 
     def _matrices(self, skin: JsonObject) -> NDArray[np.float64]:
-        """Return (J, 4, 4) float64: world from bind pose, for each joint of a skin."""
+        """Return (J, 4, 4) float64: world matrix x inverse bind matrix of each joint of a skin."""
         joints = skin.indices("joints", len(self._nodes), "nodes")
         if not joints:
             skin.fail("the skin has no joints")

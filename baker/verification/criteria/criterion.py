@@ -15,7 +15,7 @@ from baker.metrics.groups import ComparedPoints
 from baker.verification.points import EDGE, OUTLIER, SCARCE, STEEP, TEXEL, Pages, Points
 from baker.verification.unverified_area import UnverifiedArea
 
-# Smallest share of a texel's square that surface with valid points covers if the texel is interior, see
+# Smallest share of an interior texel's square that is covered by surface with valid points, see
 # `ChannelData.interior`.
 _MIN_COVERED = 0.75
 # Share of a cosine-weighted hemisphere around the shading normal that lies below the facet. Above this share,

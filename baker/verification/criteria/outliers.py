@@ -9,8 +9,8 @@ import numpy as np
 from baker.metrics.error_metrics import dark_floor
 from baker.verification.criteria.criterion import ChannelData, Criterion, CriterionResult
 
-# Limits above which a texel is wrong: error divided by the larger of value and reference, and error divided
-# by the standard error. Both must be exceeded.
+# Limits above which a component of a texel is wrong: error divided by the largest of value, reference and
+# dark floor, and error divided by the standard error. Both must be exceeded.
 _WRONG, _Z = 0.3, 4.0
 
 
