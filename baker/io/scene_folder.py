@@ -18,7 +18,7 @@ class OutsideError(InputError):
     """Raised if a scene refers to a file outside its folder, even if a bake does not need the file."""
 
 
-class OutsideName(Exception):  # noqa: N818 - a reason, which becomes an OutsideError with file and object
+class OutsideName(Exception):  # noqa: N818 - its callers raise an OutsideError instead
     """Raised if a file name leads outside the folder of the scene.
 
     The message continues a sentence about the file: "is outside of the scene's folder; ...".

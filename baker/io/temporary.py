@@ -40,7 +40,7 @@ class Temporary:
 
 
 class TemporaryFolder:
-    """A temporary folder of this process, locked from its creation to its removal.
+    """A temporary folder of this process, locked until its removal if the file system supports locks.
 
     Parameters
     ----------

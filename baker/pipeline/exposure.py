@@ -15,7 +15,7 @@ LEVEL = 0.18
 # Number of significant digits of the result, and its upper limit, which a 32-bit float can represent.
 _DIGITS = 4
 _LARGEST = 1e30
-# Texels that are processed at a time, to limit memory.
+# Number of texels that are processed at a time, to limit memory.
 _BLOCK = 1 << 20
 
 

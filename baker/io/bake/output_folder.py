@@ -1,10 +1,11 @@
 """Replaces an output folder as a whole: after an error it contains the complete old bake.
 
-All files are written to a temporary folder beside the output folder. At the end, the file system exchanges
-the two folders in one atomic step. In two cases the files are moved one by one instead: if the output folder
-cannot be renamed (see `baker.io.bake.mounts`), or if the file system does not support the exchange. In the
-first case, the temporary folder is inside the output folder. A journal records these moves. If the process is
-killed before the last move, `baker.io.bake.recovery` undoes the moves.
+All files are written to a temporary folder beside the output folder. At the end, the temporary folder is
+renamed to the output folder. If the output folder exists, the file system exchanges the two folders in one
+atomic step. In two cases the files are moved one by one instead: if the output folder cannot be renamed (see
+`baker.io.bake.mounts`), or if the file system does not support the exchange. In the first case, the temporary
+folder is inside the output folder. A journal records these moves. If the process is killed before the last
+move, `baker.io.bake.recovery` undoes the moves.
 """
 
 from __future__ import annotations

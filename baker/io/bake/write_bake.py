@@ -33,8 +33,8 @@ STATUS_COLOURS = {
     TexelStatus.UNCONVERGED: (240, 228, 66),
 }
 
-# Share of a page's texels that are not empty, 0 to 1. If a larger share is banded (see
-# `baker.core.encoding.Loss`), there is a warning.
+# Largest share of banded texels (see `baker.core.encoding.Loss`) among all texels of a page that are not
+# empty, 0 to 1. Above this share, there is a warning.
 BANDED_SHARE = 0.01
 
 
