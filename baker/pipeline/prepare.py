@@ -48,7 +48,7 @@ class PreparedScene:
     rays : RayScene
         Ray tree; the caller of `prepare_scene` closes it.
     emitters : Emitters
-        Emissive triangles, grouped in clusters.
+        Emissive triangles and parts of triangles, grouped in clusters.
     hit_kind : (T,) uint8
         Meaning of a first hit on each triangle, see `baker.kernels.probe`.
     outside : (n_uncut,) uint16

@@ -178,8 +178,9 @@ def ambient_occlusion(run: RenderRun, distance: float) -> PointEstimate:
 def lit_by(run: RenderRun, baked: BakedLight, sky: tuple[float, float, float]) -> PointEstimate:
     """Return the radiance (H * W, 3), cd/m2, that an engine shows with the bake.
 
-    At first hits, it is albedo x irradiance / pi + emission. For rays without a hit, it is `sky`. Both are
-    multiplied by `FirstHits.kept`, for the `BLEND` surfaces that the ray passed.
+    At first hits on sides that reflect light, it is albedo x irradiance / pi + emission. For rays without a
+    hit, it is `sky`. Both are multiplied by `FirstHits.kept`, for the `BLEND` surfaces that the ray passed.
+    At all other hits, it is 0.
     """
     estimate = new_estimate(run.pixels, 3, 1)
 
