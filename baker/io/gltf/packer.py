@@ -268,7 +268,7 @@ def _tidy(items: list[Json], free: list[int], blank: Json) -> None:
 
 
 def _unused(document: Json, replaced: frozenset[int]) -> tuple[list[int], list[int]]:
-    """Return the replaced accessors that nothing else refers to, and the views that only they use."""
+    """Return the replaced accessors that nothing else can refer to, and the views that only they use."""
     used: set[int] = set()
     for _, mesh in objects(document, "meshes"):
         for _, primitive in objects(mesh, "primitives"):
