@@ -93,12 +93,12 @@ def add_emission(chosen, surface, triangle, bary, shading, light):  # type: igno
 def other_scene(bake: StoredBake, scene: Path, *, allow_outside: bool) -> list[SceneWarning]:
     """Return one warning if a scene file differs from the baked file, else an empty list.
 
-    `allow_outside` is passed to `load_scene`.
+    `allow_outside` decides whether files outside the folder of the scene may be read.
 
     Raises
     ------
     InputError
-        If the file differs and cannot be read.
+        If the file cannot be read.
     """
     own = bake.folder / SCENE_NAME
     known = bake.manifest.get("input", {}).get("sha256")

@@ -70,7 +70,7 @@ def texel_owners(uv, triangle, page, instance, size, owner, most):
 
 @kernel
 def texel_pieces(uv, triangle, page, size, wanted, at, piece, corners, polygon, write, area):
-    """Count the pieces of triangles inside n selected texels, or store them if `write` is not empty.
+    """Count the pieces of triangles inside n selected texels; also store them if `write` is not empty.
 
     N is the number of texels of all pages, and m the number of pieces.
 
@@ -113,7 +113,9 @@ def texel_pieces(uv, triangle, page, size, wanted, at, piece, corners, polygon, 
 def spread_pieces(
     uv, triangle, size, pixel, start, piece, corners, polygon, area, random, found, weight, covered, middle
 ):
-    """Choose k points in the pieces of each texel, with uniform density in uv.
+    """Choose k points in the pieces of each of n texels, with uniform density in uv.
+
+    For a texel without pieces, only `covered` is written.
 
     uv : (V, 2) float32, lightmap uv of the vertices, 0 to 1
     triangle : (T, 3) int32, indices into `uv`
