@@ -44,9 +44,9 @@ def enclosed_faces(context: CheckContext) -> Iterator[RawFinding]:
 
     Examples are the base of a crate that is sunk into a floor, the end of a wall inside another wall, and
     faces between two boxes that touch. They are never visible and receive no light. A bake marks their texels
-    invalid and fills them from visible neighbours of the same chart. A closed surface with a light, a camera
-    or most of the scene inside is a room, not a solid. A face is reported if its centroid and three points
-    near its corners are inside a solid.
+    invalid and fills them from visible neighbours of the same chart. A closed surface with a light, an
+    emitting part, a camera or most of the scene inside is a room, not a solid. A face is reported if its
+    centroid and three points near its corners are inside a solid.
 
     The rule also reports double-sided faces that bound a solid and whose fronts point into the solid. Flip
     these faces, because their lightmap contains the light of their fronts, and there is none in the solid.

@@ -292,7 +292,7 @@ def emissive_black(context: CheckContext) -> Iterator[RawFinding]:
     fix="turn the light: it shines along its node's -Z",
 )
 def sun_below(context: CheckContext) -> Iterator[RawFinding]:
-    """A directional light that shines on the front of no floor.
+    """A directional light that comes from below every floor of the scene.
 
     Floors are faces whose normal has a y component above 0.5. Scenes without floors are not tested.
     """
