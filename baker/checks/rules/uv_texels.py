@@ -232,7 +232,7 @@ def palette(context: CheckContext) -> Iterator[RawFinding]:
 
     Faces with more than 90 % of the surface are single points in this uv set, so it cannot be used as a
     lightmap uv. Some engines use TEXCOORD_0 for the lightmap if TEXCOORD_1 is missing. An object is reported
-    if it has at least twice as many faces as different colours.
+    if it has at least twice as many faces as different points in this uv set, rounded to 1/256.
     """
     for m, facts in enumerate(context.meshes):
         uv = UvFacts(facts, 0)
