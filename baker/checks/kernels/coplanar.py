@@ -12,8 +12,8 @@ from baker.trace.jit import inner, kernel
 def coplanar_partners(corner, low, high, first, owner, slack, partner):
     """For each triangle, write the index of one coplanar triangle that overlaps it and has another owner.
 
-    Two triangles overlap if their projections on the normals of all six sides overlap (separating axis
-    theorem).
+    Two triangles overlap if their projections on the normals of all six sides overlap by more than `slack`
+    (separating axis theorem). Pairs of triangles that both have a partner already are not tested.
 
     Parameters
     ----------
@@ -21,15 +21,15 @@ def coplanar_partners(corner, low, high, first, owner, slack, partner):
         Corners of each triangle, 2D coordinates in its plane. Triangles are grouped by plane, and those of a
         plane are sorted by `low[:, 0]`.
     low, high : (T, 2) float64
-        Bounding box of each triangle, in the same coordinates.
+        Lowest and highest corner of the bounding box of each triangle, in the same coordinates.
     first : (P + 1,) int64
         Index of the first triangle of each of P planes; the last entry is T.
     owner : (T,) int64
         Object of each triangle.
     slack : float
-        Largest overlap along an axis that is treated as none, in the unit of `corner`.
+        Length of the overlap of two projections up to which they count as separate, in the unit of `corner`.
     partner : (T,) int64
-        In and out: index of an overlapping triangle, -1 if none is known.
+        In and out: index of an overlapping triangle of another object, -1 if none is known.
     """
     for p in range(len(first) - 1):
         for i in range(first[p], first[p + 1]):
@@ -47,7 +47,10 @@ def coplanar_partners(corner, low, high, first, owner, slack, partner):
 
 @inner
 def _apart(a, b, slack):
-    """Return whether a side of triangle `a` (3, 2) separates `a` from triangle `b` (3, 2), up to `slack`."""
+    """Return whether the line of a side of triangle `a` separates it from triangle `b`, up to `slack`.
+
+    a, b : (3, 2) float64, corners; slack : see `coplanar_partners`
+    """
     turn = (a[1, 0] - a[0, 0]) * (a[2, 1] - a[0, 1]) - (a[1, 1] - a[0, 1]) * (a[2, 0] - a[0, 0])
     sign = 1.0 if turn > 0.0 else -1.0
     for k in range(3):

@@ -7,11 +7,11 @@ import numpy as np
 
 from baker.trace.jit import kernel
 
-# Indices into `counts`:
-# COVERED: number of samples that at least one triangle covers;
-# COVERED_AGAIN: number of times that a triangle covers a sample that an earlier triangle covers;
-# OVERLAPPING: number of triangles that share samples with an earlier triangle;
-# LISTED: number of pairs written to `pairs`.
+# Indices into `counts`, which has these numbers:
+# COVERED: samples that at least one triangle covers;
+# COVERED_AGAIN: cases in which a triangle covers a sample that an earlier triangle covers;
+# OVERLAPPING: triangles that share a sample with an earlier triangle;
+# LISTED: pairs written to `pairs`.
 COVERED, COVERED_AGAIN, OVERLAPPING, LISTED = 0, 1, 2, 3
 
 
@@ -19,20 +19,21 @@ COVERED, COVERED_AGAIN, OVERLAPPING, LISTED = 0, 1, 2, 3
 def cover_pairs(corner, slack, owner, pairs, counts):
     """Mark the samples that each triangle covers, and list pairs of triangles that share samples.
 
-    Sample (r, c) lies at (c + 0.5, r + 0.5). A triangle covers a sample that lies inside it, farther than
-    `slack` from every side.
+    Sample (r, c) is at x = c + 0.5, y = r + 0.5. A triangle covers a sample if the sample is inside and more
+    than `slack` away from each side. Triangles with two equal corners cover no samples.
 
     Parameters
     ----------
     corner : (T, 3, 2) float64
         Corners (x, y) of each triangle, in sample spacings.
     slack : float
-        Distance from a side within which a sample is not covered, in sample spacings.
+        Distance from a side up to which a sample is not covered, in sample spacings.
     owner : (H, W) int32
         In and out: 1 + index of the last triangle that covered each sample; 0 if none did.
     pairs : (K, 2) int64
-        Out: the first K pairs (earlier triangle, later triangle) that share samples. A pair may be repeated
-        if the later triangle also shares samples with other triangles.
+        Out: the first K pairs (earlier triangle, later triangle) that share samples. Of several earlier
+        triangles that cover a sample, only the last is paired with the later triangle. A pair may be listed
+        more than once.
     counts : (4,) int64
         In and out: totals, see `COVERED` to `LISTED`.
     """
