@@ -111,7 +111,7 @@ def write_made_up(
     folder.mkdir(parents=True, exist_ok=True)
     scene = load_scene(write(folder / "probe.glb", builder))
     count = len(scene.instances)
-    layouts = tuple(_whole(scene, index) for index in range(count))
+    layouts = tuple(whole_layout(scene, index, index) for index in range(count))
     result = BakeResult(
         scene=scene,
         atlas=Atlas(SIZE, count, layouts, count, 0),
@@ -128,12 +128,13 @@ def write_made_up(
     return folder / "out"
 
 
-def _whole(scene: baker.Scene, index: int) -> InstanceLayout:
+def whole_layout(scene: baker.Scene, index: int, page: int) -> InstanceLayout:
+    """Return the layout of an instance whose TEXCOORD_1 is used as it is, on a page."""
     mesh = scene.meshes[scene.instances[index].mesh]
     uv, vertex = mesh.texcoord[1], np.arange(len(mesh.position), dtype=np.int32)
     assert uv is not None
     chart = np.full(len(mesh.triangle), index, np.int32)
-    return InstanceLayout(index, index, vertex, uv, mesh.triangle, chart, True, SIZE / 2)
+    return InstanceLayout(index, page, vertex, uv, mesh.triangle, chart, True, SIZE / 2)
 
 
 def room_builder() -> GltfBuilder:
