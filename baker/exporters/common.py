@@ -278,6 +278,13 @@ def _replace_lights(document: dict[str, Any]) -> bool:
     return bool(foreign)
 
 
+def black_lights(document: dict[str, Any]) -> None:
+    """Set the intensity of all lights to 0, for loaders that cannot hide them; types become standard ones."""
+    _replace_lights(document)
+    for _, light in objects(document.get("extensions", {}).get("KHR_lights_punctual", {}), "lights"):
+        light["intensity"] = 0.0
+
+
 def _read_document(file: BinaryIO) -> dict[str, Any]:
     """Read the glTF document of a GLB; the file is then at the binary chunk."""
     (length,) = struct.unpack_from("<I", file.read(20), 12)

@@ -25,7 +25,7 @@ from baker.core.settings import make_settings
 from baker.encodings.exr import decode_exr
 from baker.encodings.hdr import HdrEncoding
 from baker.exporters.bevy import ev100
-from baker.exporters.common import template, unique_name
+from baker.exporters.common import black_lights, template, unique_name
 from baker.exporters.unity import scale_offset
 from baker.io.bake.write_bake import write_bake
 from baker.io.load import load_scene
@@ -201,6 +201,71 @@ def test_web_exports_without_webp_pages_need_no_module_for_them(bake, name):
     pages = json.loads((bake[0] / name / "lightmap.json").read_text("utf-8"))["pages"]
     assert [page["encodings"] for page in pages] == [{}, {}]
     assert not (bake[0] / name / "rgbm.js").exists()
+
+
+def test_moz_lightmap_holds_the_irradiance(bake, tmp_path):
+    """Texel x intensity is E in both pictures of a page, and each object has the texture of its page."""
+    from io import BytesIO
+
+    from PIL import Image
+
+    out, _ = bake
+    path = out / "gltf" / "lightmaps.glb"
+    glb, old = document(path), document(out / "scene.glb")
+    lightmaps = [m["extensions"]["MOZ_lightmap"] for m in glb["materials"][len(old["materials"]) :]]
+    (intensity,) = {entry["intensity"] for entry in lightmaps}
+    assert f"is an irradiance of {intensity:.6g} lx" in (out / "gltf" / "README.md").read_text("utf-8")
+    assert {entry["texCoord"] for entry in lightmaps} == {1}
+    for number in range(2):
+        light = decode_exr(out / f"irradiance_{number}.exr").pixels
+        texture = next(t for t in glb["textures"] if t["name"] == f"irradiance_{number}")
+        (tmp_path / "page.hdr").write_bytes(
+            picture(path, texture["extensions"]["MOZ_texture_rgbe"]["source"])
+        )
+        exact = HdrEncoding().decode(tmp_path / "page.hdr").pixels * intensity
+        assert np.abs(exact - light).max() <= light.max() / 256
+        # The brightest 1 % of the PNG are white.
+        levels = np.asarray(Image.open(BytesIO(picture(path, texture["source"])))) / 255.0 * intensity
+        assert np.abs(levels - np.minimum(light, intensity)).max() <= 0.51 / 255 * intensity
+        assert (light.max(axis=-1) > intensity).mean() <= 0.02
+    for index, node in enumerate(glb["nodes"]):
+        (primitive,) = glb["meshes"][node["mesh"]]["primitives"]
+        material = glb["materials"][primitive["material"]]
+        texture = material["extensions"]["MOZ_lightmap"]["index"]
+        assert glb["textures"][texture]["name"] == f"irradiance_{index % 2}"
+        assert material["pbrMetallicRoughness"]["metallicFactor"] == 0.0
+        assert "occlusionTexture" not in material
+
+
+def picture(path, image):
+    """Return the bytes of an image of a GLB."""
+    data, glb = path.read_bytes(), document(path)
+    (length,) = struct.unpack_from("<I", data, 12)
+    view = glb["bufferViews"][glb["images"][image]["bufferView"]]
+    start = 28 + length + view["byteOffset"]
+    return data[start : start + view["byteLength"]]
+
+
+def test_moz_lightmap_keeps_unlit_materials_and_makes_lights_black():
+    """Materials are shared by pages and primitives without a material get one."""
+    from baker.exporters.moz_lightmap import _add_lightmaps
+
+    glb = {
+        "materials": [{"name": "a"}, {"extensions": {"KHR_materials_unlit": {}}}],
+        "meshes": [
+            {"primitives": [{"material": 0}, {}]},
+            {"primitives": [{"material": 0}, {"material": 1}]},
+            {"primitives": [{"material": 0}]},
+        ],
+        "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 5.0}]}},
+    }
+    _add_lightmaps(glb, {0: 7, 1: 8}, 2.0)
+    black_lights(glb)
+    used = [[p["material"] for p in mesh["primitives"]] for mesh in glb["meshes"]]
+    assert used == [[2, 3], [4, 1], [0]]
+    textures = [m.get("extensions", {}).get("MOZ_lightmap", {}).get("index") for m in glb["materials"]]
+    assert textures == [None, None, 7, 7, 8]
+    assert glb["extensions"]["KHR_lights_punctual"]["lights"] == [{"type": "point", "intensity": 0.0}]
 
 
 def test_playcanvas_pages_hold_lx_and_objects_their_own_meshes(bake):

@@ -17,6 +17,8 @@ from baker.core.export import EXPORTS
 
 pytestmark = pytest.mark.engines
 ASSETS = Path(__file__).parents[2] / "assets"
+# Warnings about the Radiance pictures of lightmaps.glb, which only the extension MOZ_texture_rgbe allows.
+FOREIGN = {(1, "IMAGE_UNRECOGNIZED_FORMAT"), (1, "VALUE_NOT_IN_LIST")}
 
 
 def validate(path):
@@ -41,7 +43,7 @@ def test_baking_brings_no_new_error_into_a_glb(tmp_path, name):
     )
     before = validate(source)
     for path in sorted(out.rglob("*.glb")):
-        new = set(validate(path)) - set(before)
+        new = set(validate(path)) - set(before) - (FOREIGN if path.name == "lightmaps.glb" else set())
         assert not new, (path, new)
 
 
@@ -49,7 +51,8 @@ def test_every_glb_of_an_export_is_valid(probe):
     paths = sorted(probe.rglob("*.glb"))
     assert len(paths) > 2
     for path in paths:
-        assert validate(path) == [], path
+        found = set(validate(path))
+        assert found == (FOREIGN if path.name == "lightmaps.glb" else set()), path
 
 
 def test_the_validator_finds_what_is_wrong(probe, tmp_path):

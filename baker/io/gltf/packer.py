@@ -41,7 +41,18 @@ _NO_DATA = (
 
 
 def is_index(value: object) -> TypeGuard[int]:
-    """Return whether a JSON value is a non-negative integer."""
+    """Return whether a JSON value is a non-negative integer.
+
+    Parameters
+    ----------
+    value : object
+        Any JSON value; True and False are no integers.
+
+    Returns
+    -------
+    bool
+        Whether the value can be an index.
+    """
     return isinstance(value, int) and not isinstance(value, bool) and value >= 0
 
 
