@@ -81,7 +81,7 @@ def write_after(folder, channels=("irradiance", "ao")):
     result = BakeResult(
         scene=scene,
         atlas=Atlas(SIZE, 1, tuple(whole_layout(scene, index, 0) for index in range(3)), 3, 0),
-        settings=make_settings({"resolution": SIZE}),
+        settings=make_settings({"resolution": SIZE, "export": "gltf"}),
         lightmaps={name: maps[name] for name in channels},
         status=np.ones((1, SIZE, SIZE), np.uint8),
         texel_count=np.full(3, SIZE * SIZE),
@@ -226,6 +226,13 @@ def test_other_flags_lose(tmp_path, scene, command, lost):
 def test_gltfpack_drops_the_uv_of_a_bake_without_ao_unless_told(tmp_path, without_ao):
     """Without AO no texture reads the lightmap uv."""
     assert after(tmp_path, without_ao, f"{PACK} -c -noq").texels > 0.5
+
+
+def test_gltf_transform_removes_moz_lightmap(tmp_path, scene):
+    source, out = scene.parent / "gltf" / "lightmaps.glb", tmp_path / "changed.glb"
+    run("gltf-transform", "copy", source, out)
+    assert b"MOZ_lightmap" in source.read_bytes()
+    assert b"MOZ_lightmap" not in out.read_bytes()
 
 
 def test_gltfjsx_names_each_node_and_changes_the_file_only_with_transform(tmp_path, scene):
