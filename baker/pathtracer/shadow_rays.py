@@ -1,5 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Collects shadow rays in packets by light, and traces each packet when it contains eight rays."""
+"""Collects shadow rays in eight packets, and traces a packet when it contains eight rays.
+
+Rays to the same light are in the same packet. With more than eight lights, consecutive lights share a packet.
+The caller traces incomplete packets at the end.
+"""
 
 from __future__ import annotations
 
@@ -28,11 +32,12 @@ _L = BLOCK_WIDTH
 
 @inner
 def cast_packet(bins, filled, k, occluded, scene, blend, on, out):
-    """Trace packet k, add the light of its unblocked rays to their points' sums, and empty the packet.
+    """Trace packet k, add the light of its unblocked rays to `out`, and empty the packet.
 
     bins : packets, float32, see `PathMemory`; filled : (BINS,) int64, number of rays in each packet
     occluded, scene, blend : see `PathMemory`; on : (8,) int32, working memory
-    out : (m, 3) float64, sums of m points
+    out : (m, 3) float64, sums of light, one row for each point or pixel at which paths start; the row of a
+        ray is the number in its `BIN_POINT`
     """
     n, start = filled[k], unsigned(k * BIN_ROWS * _L)
     for lane in range(BLOCK_WIDTH):
@@ -49,9 +54,9 @@ def cast_packet(bins, filled, k, occluded, scene, blend, on, out):
 
 @inner
 def cast_to_lights(s, base, light, n_lights, bins, filled, occluded, scene, blend, on, out):
-    """Append the shadow rays of a block's lanes to the packets of their lights; trace full packets.
+    """Append the shadow rays of eight paths to the packets of their lights; trace full packets.
 
-    s : blocks, float32; base : index of the block's first number
+    s : float32, blocks of eight paths, see `path_blocks`; base : index in `s` of the block's first number
     light : (8,) int64, number of each lane's light, -1 without a ray; n_lights : number of all lights
     bins, filled, occluded, scene, blend, on, out : see `cast_packet`
 

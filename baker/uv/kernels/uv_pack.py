@@ -1,8 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
 """Rasterises chart outlines conservatively, and places them in a page by first fit, from the lowest row up.
 
-An outline consists of one span of texels for each row. The search for free space skips whole runs of used
-texels, so that its time hardly depends on the size of the page.
+A shape is a set of triangles, and an item is one placed copy of a shape. The outline of a shape consists of
+one span of texels for each row. In each row of the page, the search for free space skips whole runs of used
+texels, so its time depends on the number of runs and not on the width of the page.
 
 Based on: Lévy, Petitjean, Ray, Maillot, *Least Squares Conformal Maps for Automatic Texture Atlas
 Generation*, 2002 (packing along outlines). Unlike that method, this one also uses free space below outlines.
@@ -22,7 +23,8 @@ def outline_spans(corner, first_triangle, shape, scale, first_row, low, high):
     Parameters
     ----------
     corner : (T, 3, 2) float64, metres
-        Corners of the triangles of all shapes. The lower corner of each shape is at 0.
+        Corners of the triangles of all shapes. The lower left corner of the bounding box of each shape is
+        at (0, 0).
     first_triangle : (S + 1,) int64
         Shape s has the triangles `first_triangle[s]` to `first_triangle[s + 1]` - 1.
     shape : (n,) int64
@@ -30,7 +32,7 @@ def outline_spans(corner, first_triangle, shape, scale, first_row, low, high):
     scale : (S, 2) float64, texels per metre
         Scale of each shape along u and v.
     first_row : (S + 1,) int64
-        Shape s has the items `first_row[s]` to `first_row[s + 1]` - 1 of `low` and `high`, one for each row.
+        The rows of shape s are the elements `first_row[s]` to `first_row[s + 1]` - 1 of `low` and `high`.
     low, high : (R,) int32
         In: a large number (`low`) and -1 (`high`). Out: columns of the first and of the last texel that the
         shape touches in this row. Texel k spans k - 0.5 to k + 0.5.
@@ -93,7 +95,7 @@ def _find(next_used, next_free, low, high, row0, n_rows, margin, y_start):
     """Return the lowest and then leftmost position (x, y) at which an outline fits, or (-1, -1).
 
     next_used, next_free : (H, W + 1) int16, see `place_items`
-    low, high : (R,) int32, see `outline_spans`; the outline is items `row0` to `row0 + n_rows` - 1
+    low, high : (R,) int32, see `outline_spans`; the outline is elements `row0` to `row0 + n_rows` - 1
     margin : number of empty texels along the page border; y_start : lowest row to test
     """
     height = next_used.shape[0]
@@ -143,7 +145,7 @@ def place_items(next_used, next_free, order, item_shape, first_row, low, high, g
     lowest : (S,) int64
         In and out: lowest row at which each shape may still fit.
     position : (I, 2) int32
-        Out: column and row of each item's lower corner.
+        Out: column and row of the texel at the lower left corner of each item's bounding box.
 
     Returns
     -------
