@@ -15,6 +15,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.error import HTTPError
 from urllib.parse import urljoin, urlsplit
 from urllib.request import urlopen
 
@@ -178,8 +179,11 @@ def _fetch(url: str, target: Path) -> None:
         if address in seen:
             continue
         seen.add(address)
-        with urlopen(urljoin(url, address), timeout=30) as answer:
-            content, kind = answer.read(), answer.headers["Content-Type"]
+        try:
+            with urlopen(urljoin(url, address), timeout=30) as answer:
+                content, kind = answer.read(), answer.headers["Content-Type"]
+        except HTTPError as error:
+            content, kind = b"", f"status {error.code}"
         (target / (address.strip("/").replace("/", "_") or "index")).write_bytes(content)
         (target / "types.txt").open("a").write(f"{address} {kind}\n")
         if address.startswith("/static") or address == "/":
