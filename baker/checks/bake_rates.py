@@ -16,7 +16,7 @@ from typing import Any
 from baker.core.errors import BakerError, InputError, SettingsError
 from baker.core.stage import Stage
 from baker.io.bake.output_folder import MANIFEST_NAME
-from baker.io.bake.read_manifest import read_manifest
+from baker.io.bake.read_manifest import read_manifest, read_unrecovered
 from baker.io.regular_file import read_regular
 
 # Largest number of entries of the scene's folder, in alphabetical order, that are searched for `bake.json`.
@@ -104,13 +104,13 @@ def rates_beside(scene: Path) -> Rates | None:
     # Python raises RuntimeError for a loop of symbolic links.
     with contextlib.suppress(OSError, ValueError, RuntimeError):
         for folder in sorted(scene.resolve().parent.iterdir())[:_MOST_FOLDERS]:
-            # Skip unreadable manifests: the user did not name these folders.
+            # The user did not name these folders: write nothing there, and skip unreadable manifests.
             with contextlib.suppress(OSError, ValueError, BakerError):
                 # Validation takes long, so skip the bakes of other scenes first.
                 text = read_regular(folder / MANIFEST_NAME, most=_MOST_BYTES)
                 if json.dumps(scene.name, ensure_ascii=False)[1:-1].encode() not in text:
                     continue
-                manifest = read_manifest(folder)
+                manifest = read_unrecovered(folder)
                 if (folder / str(manifest["input"]["path"])).resolve() == scene.resolve():
                     found.append((str(manifest["created"]), folder.name, rates_of_bake(manifest)))
     if not found:

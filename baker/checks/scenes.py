@@ -31,7 +31,8 @@ def find_scenes(paths: Sequence[Path]) -> list[Path]:
     ----------
     paths : sequence of Path
         Paths of files, folders, or patterns with `*`, `?` or `[`. A folder stands for all scene files in it
-        and in its subfolders. A pattern stands for all files and folders that match it, of any format.
+        and in its subfolders. A pattern stands for the scene files that match it, and for those in the
+        folders that match it.
 
     Returns
     -------
@@ -41,26 +42,33 @@ def find_scenes(paths: Sequence[Path]) -> list[Path]:
     Raises
     ------
     InputError
-        If a folder contains no scene file, or a pattern matches nothing.
+        If a folder contains no scene file, or a pattern matches none.
     """
     known = set(IMPORTERS.names())
     found: dict[Path, None] = {}
     for path in paths:
         if path.is_dir():
-            inside = sorted(p for p in path.rglob("*") if p.suffix.lower() in known and p.is_file())
+            inside = _below(path, known)
             if not inside:
                 raise InputError(f"there is no scene file ({', '.join(sorted(known))}) below", file=str(path))
-            found.update(dict.fromkeys(inside))
         elif not path.exists() and glob.has_magic(str(path)):
             # Expand the pattern here, because some shells pass it on unexpanded.
             root = Path(path.anchor)
-            matches = sorted(root.glob(str(path.relative_to(root))))
-            if not matches:
-                raise InputError("no file has a name like this", file=str(path))
-            found.update(dict.fromkeys(matches))
+            inside = [
+                p for match in sorted(root.glob(str(path.relative_to(root)))) for p in _below(match, known)
+            ]
+            if not inside:
+                raise InputError("no scene file has a name like this", file=str(path))
         else:
-            found[path] = None
+            inside = [path]
+        found.update(dict.fromkeys(inside))
     return list(found)
+
+
+def _below(path: Path, known: set[str]) -> list[Path]:
+    """Return the sorted scene files in a folder and its subfolders; for a scene file, the file itself."""
+    inside = path.rglob("*") if path.is_dir() else [path]
+    return sorted(p for p in inside if p.suffix.lower() in known and p.is_file())
 
 
 def check_scenes(

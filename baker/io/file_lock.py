@@ -45,6 +45,11 @@ def is_at(file: int, path: Path) -> bool:
 
 def is_alive(process: int) -> bool:
     """Return whether a process with this id exists."""
+    if os.name == "nt":
+        # `os.kill` with signal 0 would send Ctrl-C to the process on Windows.
+        from baker.core.processes import has_process
+
+        return has_process(process)
     try:
         os.kill(process, 0)
     except (ProcessLookupError, OverflowError):

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from baker.channels.channel import Channel, chosen_channels
 from baker.core.budget import Workload, image_bytes, surface_area, texels_and_pages
 from baker.core.errors import ResourceError
-from baker.core.free_memory import free_memory, used_memory
+from baker.core.processes import free_memory, used_memory
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
 

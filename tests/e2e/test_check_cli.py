@@ -145,10 +145,13 @@ def test_wrong_use(overlap):
 
 def test_folders_and_patterns(tmp_path, overlap):
     write(tmp_path / "zero.glb", CASES["zero-area"].bad)
-    for argument in (tmp_path, tmp_path / "*.glb"):
+    (tmp_path / "textures").mkdir()
+    (tmp_path / "textures" / "grey.png").write_bytes(b"PNG")
+    for argument in (tmp_path, tmp_path / "*.glb", tmp_path / "*", tmp_path.parent / f"{tmp_path.name}*"):
         code, result = check(argument)
         assert code == 1
         assert len(result["scenes"]) == 2
+    assert check(tmp_path / "tex*")[0] == 3
 
 
 def test_sarif_is_valid_and_points_at_rules(tmp_path, overlap, monkeypatch):

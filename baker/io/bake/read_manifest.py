@@ -26,7 +26,29 @@ _SHORT = 60
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Return the manifest of an output folder. First, `recover` undoes incomplete writes of killed processes.
+    """Undo incomplete writes of killed processes (`recover`), and return the manifest of an output folder.
+
+    Parameters
+    ----------
+    folder : Path
+        The output folder.
+
+    Returns
+    -------
+    dict
+        See `read_unrecovered`.
+
+    Raises
+    ------
+    InputError
+        If there is no such folder, it holds no bake, or the manifest is damaged.
+    """
+    recover(folder)
+    return read_unrecovered(folder)
+
+
+def read_unrecovered(folder: Path) -> dict[str, Any]:
+    """Return the manifest of an output folder, and write nothing.
 
     Parameters
     ----------
@@ -46,7 +68,6 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     InputError
         If there is no such folder, it holds no bake, or the manifest is damaged.
     """
-    recover(folder)
     if why := not_text(folder):
         raise InputError(f"{why}; rename it", file=str(folder))
     if not folder.exists():

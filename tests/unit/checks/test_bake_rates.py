@@ -42,6 +42,15 @@ def test_the_latest_bake_beside_a_scene_is_found(out):
     assert rates_beside(scene_of(out).with_name("other.glb")) is None
 
 
+def test_folders_that_the_user_did_not_name_are_only_read(out, monkeypatch):
+    scene, recovered = scene_of(out), []
+    monkeypatch.setattr("baker.io.bake.read_manifest.recover", recovered.append)
+    assert rates_beside(scene) is not None
+    assert recovered == []
+    rates_of(out)
+    assert recovered == [out]
+
+
 @pytest.mark.parametrize("name", DAMAGE)
 def test_a_damaged_manifest_is_skipped_or_refused(out, name):
     scene, text = scene_of(out), (out / "bake.json").read_text()

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from baker.channels.channel import chosen_channels
-from baker.core import free_memory as memory
+from baker.core import processes as memory
 from baker.core.errors import ResourceError
 from baker.core.settings import make_settings
 from baker.io.load import load_scene

@@ -1,4 +1,4 @@
-"""Reads how much memory this process may still use: free memory of the machine, limits of control groups."""
+"""Reads how much memory this process uses and may still use, and which processes exist."""
 
 from __future__ import annotations
 
@@ -35,6 +35,27 @@ def used_memory() -> int:
     import psutil
 
     return int(psutil.Process().memory_info().rss)
+
+
+def has_process(process: int) -> bool:
+    """Return whether a process with this id exists.
+
+    Parameters
+    ----------
+    process : int
+        The id of the process.
+
+    Returns
+    -------
+    bool
+        False also for ids that no process can have.
+    """
+    import psutil
+
+    try:
+        return bool(psutil.pid_exists(process))
+    except OverflowError:
+        return False
 
 
 def _left_in_groups(proc: Path, cgroups: Path) -> Iterator[int]:
