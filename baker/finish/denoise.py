@@ -76,8 +76,8 @@ _BORDER_TEXELS = 4096
 # the page. Larger bounds are scaled down to this ratio. The true error of AO is 0.95 to 1.2 times the
 # estimated noise (scenes Cornell, interior and hall; 16 to 256 rays).
 FITTED = 1.2
-# Limit of the ratio of a chart's mean luminance to the page's median, and of the ratio of the median to the
-# mean. Above this limit, the chart is scaled to the median before filtering.
+# Limit of the ratio of a chart's mean luminance to the median that `_levels` computes, and of the inverse of
+# this ratio. Above this limit, the chart is divided by the ratio before filtering.
 LEVEL = 8.0
 LUMINANCE = np.array(LUMINANCE_WEIGHTS, np.float32)
 

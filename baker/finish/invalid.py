@@ -18,7 +18,7 @@ _RING_WEIGHTS = (0.5, 1.0, 0.5, 1.0, 1.0, 0.5, 1.0, 0.5)
 def fill_invalid(
     value: NDArray[np.float32], chart: NDArray[np.int32], valid: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float32], int]:
-    """Replace the values of covered but invalid texels by means of valid texels of the same chart.
+    """Replace the values of covered but invalid texels by values from valid texels of the same chart.
 
     Values are propagated from the valid texels outwards, ring by ring. If an invalid strip of a chart lies
     between two rooms, each half of the strip therefore gets the values of the room next to it.
@@ -37,8 +37,8 @@ def fill_invalid(
     value : (H, W, C) float32
         A new page; valid and empty texels are unchanged.
     n_hopeless : int
-        Number of texels in charts without any valid texel. These texels keep their values; values that are
-        not finite become 0.
+        Number of texels in charts without any valid texel. These texels keep their values. If a component of
+        such a texel is not finite, all components of the texel become 0.
 
     Raises
     ------

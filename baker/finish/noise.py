@@ -29,7 +29,7 @@ def estimate_error(
     Parameters
     ----------
     luminance : (H, W) float32
-        The page.
+        Luminance of each texel of the page.
     chart : (H, W) int32
         Index of the chart of each covered texel.
     covered : (H, W) bool

@@ -46,7 +46,7 @@ class PackedCharts:
 
 
 def pack_charts(chart: NDArray[np.int32], chosen: NDArray[np.bool_]) -> PackedCharts:
-    """Pack the bounding boxes of charts in rows, in order of decreasing height.
+    """Pack the bounding boxes of the chosen texels of each chart in rows, in order of decreasing height.
 
     Parameters
     ----------

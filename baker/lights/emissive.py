@@ -4,9 +4,9 @@
 
 L is the luminance of the radiance. For a part of a textured triangle, L is the mean of R, G and B. The power
 of a two-sided triangle is twice as large. Textured triangles are cut into parts (`lights.emissive_texture`),
-and each part is an emitter. If the texture is constant in a part, the part has its exact mean radiance
-instead of the texture. If a part has too much detail, but the limit of the number of parts prevents further
-cuts, it has its mean radiance, too.
+and each part is an emitter. The radiance at a point of a part is looked up in the texture. In three cases,
+the part has its exact mean radiance instead: the texture is constant in the part, the part is very small
+(`_SMALL`), or its radiance varies too much (`_SPARSE`). In triangles with alpha, it is always looked up.
 
 Based on: see `kernels.emitters`.
 """

@@ -193,7 +193,7 @@ def brightness(radiance: NDArray[np.float64]) -> NDArray[np.float64]:
 def cut(
     textures: EmissiveTextures, area: NDArray[np.float64], finest: NDArray[np.float64], most: int
 ) -> Parts:
-    """Cut n triangles into parts until the noise of each triangle is at most `ENOUGH`.
+    """Cut n triangles into parts until the noise of each triangle is at most `ENOUGH`, or a limit is reached.
 
     Parameters
     ----------

@@ -73,7 +73,7 @@ class TextureLevels:
         return self._made[key]
 
     def crossed(self, uv: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return (n, 2) float64: the numbers of texel lines that each triangle's edges cross along u and v.
+        """Return (n, 2) float64: about how many texel lines each triangle's edges cross along u and v.
 
         uv : (n, 3, 2) float64, corners of the triangles
         """

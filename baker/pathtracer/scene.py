@@ -164,6 +164,8 @@ def build_reference(
 
     Raises
     ------
+    InputError
+        If the path tracer has no kernels for the kind of a light.
     ResourceError
         If Embree cannot be used or memory runs out.
     """

@@ -2,8 +2,9 @@
 
 Two estimates of the direct irradiance are computed:
 
-- `weighted` is the part that MIS (multiple importance sampling) assigns to shadow rays. The final gather adds
-  the remaining part, from its rays that hit emitters. The lightmap contains the sum of both parts.
+- `weighted` contains all light of lights without area, and the part of the emitters' light that MIS (multiple
+  importance sampling) assigns to shadow rays. The final gather adds the remaining part, from its rays that
+  hit emitters. The lightmap contains the sum of both parts.
 - `complete` is all direct light. Surfaces reflect it in the first bounce.
 """
 
@@ -58,8 +59,9 @@ class DirectLight:
     analytic : (n,) uint8
         1 for entries whose `weighted` contains all light of the visible emitters, computed in closed form.
     rays : int
-        Number of rays cast for emitters, plus 16 for each pair of an entry and a light without area. The
-        second number is an upper bound, because points that the light does not illuminate cast no ray.
+        Number of shadow rays and hemisphere rays cast for emitters, without the probe rays of
+        `radiosity.emitter_choice`, plus 16 for each pair of an entry and a light without area. The second
+        number is an upper bound, because points that the light does not illuminate cast no ray.
     """
 
     weighted: NDArray[np.float32]
@@ -186,7 +188,7 @@ class _EmitterLight:
         buffers: PacketBuffers,
         tile: _Tile,
     ) -> int:
-        """Add the light of emitters to `tile`; return the number of rays cast.
+        """Add the light of emitters to `tile`; return the number of rays cast, without probe rays.
 
         begin : int, first entry of the tile
         origin, normal : (m, 16, 3) float32, world; origins in metres, unit normals

@@ -8,8 +8,10 @@ shadow rays, the probe rays, are cast from the tile to each cluster to find whet
 - Clusters that no probe ray reaches are called hidden. They form a separate stratum with few samples, which
   MIS combines with gather rays that hit these clusters. So a cluster that is visible only through a small
   opening still contributes.
-- If a cluster that is much brighter than another visible cluster (`_OUTSHINES`) is visible from only a part
-  of the tile, visible and hidden clusters are found for each block of up to sixteen consecutive texels.
+- In two cases, visible and hidden clusters are found for each block of up to sixteen consecutive texels. In
+  the first case, a cluster that is much brighter than another visible cluster (`_OUTSHINES`) is visible from
+  only a part of the tile. In the second case, the weights of two clusters differ by more than `_OUTSHINES`,
+  and the chart or the normal changes within the tile.
 
 Based on: Ward, Adaptive shadow testing for ray tracing, 1991; Georgiev et al., Importance caching for complex
 illumination, 2012.
@@ -50,8 +52,9 @@ _FEW = 32
 # weight. If there are more than _FEW clusters, the dimmest hidden clusters, up to this limit of their total
 # weight, are sampled together with the visible clusters.
 _HARMLESS = 0.25
-# Limit of the ratio of the weights of two visible clusters. Above this limit, clusters are chosen for each
-# block if the cluster of larger weight is visible from only a part of the tile.
+# Limit of the ratio of the weights of two clusters. Above this limit, clusters are chosen for each block if
+# the chart or the normal changes within the tile, or if both clusters are visible and the cluster of larger
+# weight is visible from only a part of the tile.
 _OUTSHINES = 4.0
 # Smallest cosine between the normals of consecutive texels of a block. Below this cosine, a new block begins.
 _TURN = 0.5
@@ -96,9 +99,9 @@ class Choice(NamedTuple):
     """Emitter clusters to which the texels of a part of a tile cast shadow rays.
 
     part : slice, the part: consecutive texels, as indices within the tile
-    seen : visible clusters, to which `n_light` shadow rays are cast
-    hidden : clusters that no probe ray reached, to which `n_hidden` shadow rays are cast; None without such
-        clusters
+    seen : clusters to which `n_light` shadow rays are cast: all clusters except those in `hidden`
+    hidden : clusters of the separate stratum, which no probe ray reached, and to which `n_hidden` shadow rays
+        are cast. None if there are no such clusters, or if no cluster is visible
     found : all clusters, with the sampling densities that the MIS weights of gather rays need
     view : largest radius / distance of a cluster in `seen`, see `kernels.emitters.widest_view`
     """
@@ -222,7 +225,9 @@ class EmitterChooser:
         bounds: NDArray[np.int64],
         chosen: NDArray[np.bool_],
     ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Return two (B, C) int32: the numbers of probe rays and of unblocked ones, by block and cluster.
+        """Return two (B, C) int32 by block and cluster: numbers of probe rays, and of those that are unblocked.
+
+        Rays whose cosine at the texel or at the emitter is not positive are not cast and not counted.
 
         bounds : (B + 1,) int64, see `_blocks`; chosen : (C,) bool, clusters to probe
         """
@@ -235,9 +240,10 @@ class EmitterChooser:
         return asked, seen
 
     def _weights(self, all_emitters: TileEmitters, origin: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Return (C,) float64: power / distance^2 of clusters, 0 if a cluster faces away from the points.
+        """Return (C,) float64: power / distance^2 of clusters, 0 if the cluster's `chance` is 0.
 
-        origin : (m, w, 3) float32, metres, world; distances are from the centre of the points' bounding box
+        origin : (m, w, 3) float32, metres, world. Distances are from the centre of the points' bounding box,
+            and at least the sum of the cluster's radius and half the diagonal of that box.
         """
         points = origin.reshape(-1, 3)
         low, high = points.min(axis=0).astype(np.float64), points.max(axis=0).astype(np.float64)

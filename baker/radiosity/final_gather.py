@@ -45,7 +45,8 @@ class Gathered:
     variance : (n_front,) float32, lx2
         Variance of (R + G + B) / 3 of indirect + direct.
     rays : int
-        Number of rays cast.
+        Number of gather rays: `n_front` times the rays per texel. The second pass of rays that hit `BLEND`
+        surfaces is not counted.
     """
 
     indirect: NDArray[np.float32]

@@ -21,7 +21,7 @@ from baker.core.budget import MAX_PATCHES
 from baker.core.texels import TexelBuffer
 from baker.radiosity.kernels.regions import join_linked
 
-# Gap level, 0 to 2 (`radiosity.narrow_gaps`). Texels of this level or above get smaller blocks.
+# Smallest gap level, 0 to 2 (`radiosity.narrow_gaps`), of texels that may get smaller blocks.
 NARROW = 2
 
 
@@ -80,7 +80,7 @@ def build_patches(
 ) -> PatchSet:
     """Group texel entries into patches: square blocks whose side is a power of two.
 
-    The side is the smallest that gives at most `max_patches` patches, but at most 256 texels. A chart smaller
+    The side is the smallest that gives at most `max_patches` blocks, but at most 256 texels. A chart smaller
     than a block is still a separate patch, so an atlas of very many charts may have more than `max_patches`
     patches.
 
@@ -95,7 +95,7 @@ def build_patches(
     max_patches : int
         Intended largest number of patches, without the additional patches in narrow gaps.
     link : (m, 2) int32, optional
-        Pairs of neighbouring entries between which no surface lies (`radiosity.sides.Sides.link`). In charts
+        Pairs of neighbouring entries with mutually visible points (`radiosity.sides.Sides.link`). In charts
         with such pairs, a block is split into the parts that the pairs connect.
 
     Returns

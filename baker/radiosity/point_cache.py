@@ -90,7 +90,7 @@ def new_point_cache(n: int) -> PointCache | None:
 def tile_points(
     surface: Surface, valid_points: NDArray[np.uint16], begin: int, end: int, cache: PointCache | None
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return `origin` and `normal` (m, 16, 3) of entries begin to end, see `points_of`.
+    """Return `origin` and `normal` (m, 16, 3) of entries begin to end - 1, see `points_of`.
 
     If `cache` holds the points, they are read from it; else they are computed and stored there.
     """

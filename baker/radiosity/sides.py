@@ -70,7 +70,8 @@ class Sides:
     valid_points : (n,) uint16
         Bit k is set where point k of an entry is not inside geometry and lies on the entry's side.
     owner : (S,) int32
-        Entries of fronts and backs that were split, ascending.
+        Entries of fronts and backs, ascending, whose points form several groups, or that have a corner
+        visible from none of their points. These texels are called split.
     member : (K,) int32
         Entries of all sides of the split texels; `SideTable.member` contains indices of this array.
     table : SideTable
@@ -334,7 +335,7 @@ def _of_sides(pair: NDArray[np.int32], groups: _Groups) -> NDArray[np.int32]:
 
 
 def _see(job: TraceJob, entries: _Entries, pair: NDArray[np.int32]) -> tuple[NDArray[np.bool_], int]:
-    """Return (m,) bool, whether points of the entries see each other, and the number of rays cast.
+    """Return (m,) bool, whether a tested pair of points is mutually visible, and the number of rays cast.
 
     pair : (m, 2) int32, entries
     """
@@ -368,7 +369,7 @@ def _keep_largest(
     backs: NDArray[np.float64],
     rays: int,
 ) -> Sides:
-    """Give the best side of each split texel the texel's original entry, and number the regions.
+    """Give the side that `_order_sides` chooses the texel's original entry, and number the regions.
 
     link : (m, 2) int32, pairs of neighbouring entries with mutually visible points, in the charts `cut`
     cut : (c,) int32, charts with split texels, or with neighbouring texels that are not linked
@@ -395,7 +396,7 @@ def _keep_largest(
 
 
 def _back_share(job: TraceJob, entries: _Entries, groups: _Groups) -> tuple[NDArray[np.float64], int]:
-    """Return (S, groups) float64, the share of each side's rays that hit black backs, and the rays cast."""
+    """Return (S, groups) float64, the share of each side's rays that hit black backs, and the ray count."""
     share = np.zeros((len(groups.owner), int(groups.count.max(initial=1))))
     sobol_points = sobol_reversed(N_POINTS, job.seed, 9)
     cast = 0

@@ -71,11 +71,12 @@ class Solution:
         Number of iterations of conjugate gradients; with a fixed number of bounces, of products with the
         matrix.
     residual : float
-        |s + rho F M - M| / |s|, with Euclidean norms over the patches; the largest of the three colours.
+        |s + rho F M - M| / |s|, with Euclidean norms over the patches; the largest of the three colours. It
+        is 0 for a fixed number of bounces.
     patch_error : float
-        Largest |s + rho F M - M| / ((1 - rho) M) of a patch and colour, an estimate of the largest relative
-        error of a patch's exitance M. In a closed scene of uniform light and albedo, it is an upper bound of
-        that error.
+        Largest |s + rho F M - M| / ((1 - rho) max(M, dark)) of a patch and colour, with `dark` of `_Goal`. It
+        is an estimate of the largest relative error of a patch's exitance M. In a closed scene of uniform
+        light and albedo, it is an upper bound of that error. It is 0 for a fixed number of bounces.
     """
 
     irradiance: NDArray[np.float64]
@@ -118,7 +119,7 @@ def solve_radiosity(
         Number of reflections; None means until converged. The final gather adds the last bounce, so N bounces
         need N - 1 products here.
     progress : Progress
-        Called for each product.
+        Called at the start and for each iteration.
     threads : int
         Number of threads for products. Each matrix row is summed by one thread, so the result does not depend
         on the number.
@@ -245,7 +246,7 @@ class _Goal:
     Attributes
     ----------
     tolerance : (P, 3) float64, allowed residual as a share of max(exitance, `dark`)
-    dark : (3,) float64, lx
+    dark : (3,) float64, lx, lower limit of the exitance of each colour, see `_DARK`
     """
 
     # Limit of the residual as a share of the allowed residual. If no patch exceeds this limit, conjugate
@@ -270,7 +271,7 @@ def _conjugate_gradients(
     progress: Progress,
     iteration: int,
 ) -> int:
-    """Add the solution x of (I - rho F) x = rest to `exitance`; return the new number of iterations.
+    """Add the approximate solution x of (I - rho F) x = rest to `exitance`; return the new iteration count.
 
     I - rho F is symmetric in the scalar product weighted by A / rho.
 

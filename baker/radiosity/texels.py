@@ -19,6 +19,7 @@ from baker.kernels.surface import N_POINTS, Surface
 from baker.kernels.texel_info import texel_albedo, texel_geometry
 from baker.radiosity.kernels.texel_raster import keep_main_chart, list_overlaps, morton_keys
 
+# Texels per tile.
 _TILE = 4096
 
 

@@ -82,7 +82,7 @@ class TraceJob:
         return new_packet_buffers(self.tracer.without_transmittance(), solid=solid)
 
     def tile_points(self, begin: int, end: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return origins and normals (m, 16, 3) float32 of all points of entries begin to end."""
+        """Return origins and normals (m, 16, 3) float32 of all points of entries begin to end - 1."""
         return tile_points(self.surface, self.valid_points, begin, end, self.point_cache)
 
     def some_points(

@@ -1,4 +1,4 @@
-"""Finds the triangles whose opacity is below 1 somewhere, and builds the table of their alpha."""
+"""Finds the triangles whose opacity may be below 1 somewhere, and builds the table of their alpha."""
 
 from __future__ import annotations
 
@@ -35,7 +35,10 @@ def build_alpha(
     base_texture: NDArray[np.int32],
     base_uv: NDArray[np.float32],
 ) -> AlphaTable:
-    """Find the triangles of MASK and BLEND materials whose opacity is below 1 somewhere.
+    """Find the triangles of MASK and BLEND materials whose opacity may be below 1 somewhere.
+
+    The lower bound of a triangle's alpha is its smallest alpha at a corner times the smallest alpha of the
+    whole texture.
 
     Parameters
     ----------

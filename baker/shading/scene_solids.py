@@ -46,7 +46,7 @@ def scene_solids(scene: Scene, geometry: Geometry, shading: Shading) -> Solids:
 
 
 def hide_backs(scene: Scene, geometry: Geometry, shading: Shading) -> tuple[Geometry, NDArray[np.uint8]]:
-    """Make the faces of solids without holes one-sided, and return `hit_kind` of each triangle.
+    """Make faces one-sided if a solid without holes is at their back; also return `hit_kind` of triangles.
 
     No light arrives inside a solid without holes, so the backs of its faces need no texels.
 

@@ -19,9 +19,10 @@ none holds, it is a solid that is wound inwards.
 - A light, a camera or another part is inside.
 - It is the only part.
 
-An open part is a cover (a crate without a bottom) if a flat lid would close it, it is double-sided, its
-normals point outwards, and no light, camera or other part is inside. If all rays of a point hit the inside of
-a cover, the point is hidden, because another surface closes the opening.
+An open part of at most `winding_number.MANY` triangles is a cover (a crate without a bottom) if a flat lid
+would close it, it is double-sided, its normals point outwards, and no light, camera or other part is inside.
+If all rays of a point hit the inside of a cover, the point is hidden, because another surface closes the
+opening.
 
 No light is inside a solid, and none enters it. So if a room is classified as a solid by mistake, the error is
 small: without light, the room is dark in any case.
@@ -338,7 +339,11 @@ class _Classifier:
         return any(self._is_inside(int(other), part, surface, mostly=mostly) for other in held)
 
     def _holds_most(self, part: int) -> bool:
-        """Return whether more than `_MOST_OF_SCENE` of the other parts' area is inside `part`."""
+        """Return whether more than `_MOST_OF_SCENE` of the other parts' area is inside `part`.
+
+        The parts whose bounding boxes lie in the box of `part` must have that share of the area. Of these
+        parts, the `_HELD` largest are tested, and more than that share of their area must be inside.
+        """
         area = self.parts.area
         others = float(area.sum() - area[part])
         held = self._held_boxes(part, None, False)

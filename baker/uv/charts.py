@@ -1,4 +1,4 @@
-"""Cuts meshes into charts. Each triangle gets a chart, and no chart overlaps itself."""
+"""Cuts meshes into charts. Each triangle gets a chart, and charts hardly overlap themselves (`uv.check`)."""
 
 from __future__ import annotations
 

@@ -81,7 +81,8 @@ def page_overlap(uv: NDArray[np.floating], group: NDArray[np.integer], resolutio
 def chart_overlap(uv: NDArray[np.float64], chart: NDArray[np.int32]) -> Overlap:
     """Count the samples of each chart that its triangles cover more than once.
 
-    Each chart has its own grid of samples, about 16 per triangle.
+    Each chart has a separate grid of samples over its bounding box. The grid has about 16 samples per
+    triangle of the chart, and at most about 1024 samples along an axis.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ class KeptUv:
         Whether all instances fit one page with their TEXCOORD_1, without overlap. TEXCOORD_1 is then kept
         unchanged.
     warnings : tuple of SceneWarning
-        Warnings about instances whose TEXCOORD_1 is not valid.
+        One warning for each mesh that has a TEXCOORD_1 which is not valid.
     """
 
     usable: NDArray[np.bool_]
@@ -48,7 +48,7 @@ def find_fault(mesh: Mesh, resolution: int) -> tuple[str, str] | None:
         The mesh, which need not have TEXCOORD_1.
     resolution : int
         Width of the page in texels. It determines the number of samples of the overlap test, and the area of
-        a texel, which is the smallest uv area that is valid.
+        a texel, which the uv area of a valid TEXCOORD_1 exceeds.
 
     Returns
     -------
@@ -131,7 +131,10 @@ def choose_kept(scene: Scene, resolution: int, mode: str) -> KeptUv:
 
 
 def _disjoint(scene: Scene, resolution: int) -> bool:
-    """Return whether the TEXCOORD_1 of all instances fit one page without overlap."""
+    """Return whether the TEXCOORD_1 of all instances fit one page without overlap.
+
+    False if two instances have the same mesh.
+    """
     if len({i.mesh for i in scene.instances}) < len(scene.instances):
         return False
     uv, group = [], []

@@ -53,14 +53,16 @@ class RigidInstance:
 class Outlines:
     """All outlines of a scene of N instances, as items to pack.
 
-    An item is one chart of a `CutInstance`, or a whole `RigidInstance`. Items are sorted by instance.
+    An item is one chart of a `CutInstance`, or a whole `RigidInstance`, whose outline is the bounding
+    rectangle of its uv. Items are sorted by instance.
 
     Attributes
     ----------
     shapes : Shapes
         The S different outlines.
     turned : (S,) bool
-        Whether u and v are exchanged in the shape, which makes its width at least its height.
+        Whether u and v are exchanged in the shape, which makes its width at least its height. Always false
+        for a `RigidInstance`.
     item_shape : (I,) int64
         Shape of each item.
     first_item : (N + 1,) int64

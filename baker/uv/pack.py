@@ -188,7 +188,10 @@ def fit_page(
     span: tuple[float, float],
     most: float = np.inf,
 ) -> tuple[float, Packing] | None:
-    """Find the largest density at which all items fit into one page.
+    """Search the largest density at which all items fit into one page.
+
+    The search ends after 12 attempts, or if the density is known to 0.4 %. With 3000 or more items, it ends
+    after 7 attempts, or if the density is known to 1.5 %.
 
     Parameters
     ----------
@@ -246,6 +249,8 @@ def _estimate(shapes: Shapes, item_shape: NDArray[np.int64], inner: int, gap: in
 
     d solves sum (w d + 1 + g) (h d + 1 + g) = 0.85 inner^2. The sum is over all items. w and h are width and
     height of an item, metres. g is the gap, texels. The area of the item replaces the product w h.
+    If the gaps alone fill 85 % of the page, d is the density at which the largest side of an item is
+    0.5 inner / sqrt(number of items) texels.
     """
     area = float(shapes.area[item_shape].sum())
     half = float(shapes.extent[item_shape].sum()) * (1 + gap)

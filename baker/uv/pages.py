@@ -91,8 +91,9 @@ def fill_pages(
     """Pack all instances into pages of exactly `settings.resolution` texels.
 
     If `settings.density` is None, all instances are packed into one page, at the largest density that fits.
-    Otherwise they are packed at this density into up to `max_pages` pages. If the pages are not enough, the
-    density is lowered.
+    If no density fits, they are packed into up to `max_pages` pages. If `settings.density` is a number,
+    instances are packed at this density into up to `max_pages` pages. If the pages are not enough, the
+    density is lowered. If nothing fits with the padding of the settings, the padding is reduced.
 
     Parameters
     ----------
@@ -115,7 +116,7 @@ def fill_pages(
     Raises
     ------
     InputError
-        If there are more charts than texels.
+        If the charts do not fit the pages at any density.
     """
     warnings: list[SceneWarning] = []
     everything = np.arange(len(outlines.first_item) - 1)

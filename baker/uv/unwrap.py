@@ -60,8 +60,8 @@ def unwrap_scene(scene: Scene, settings: BakeSettings, progress: Progress = sile
     Raises
     ------
     InputError
-        If the scene has no triangles, if `uv` is "keep" and an object's TEXCOORD_1 cannot be kept, or if
-        there are more charts than texels.
+        If the scene has no triangles, if `uv` is "keep" and an object's TEXCOORD_1 cannot be kept, or if the
+        charts do not fit the pages at any density.
     Cancelled
         If `progress` returned a truthy value.
     """
