@@ -225,7 +225,7 @@ class EmitterChooser:
         bounds: NDArray[np.int64],
         chosen: NDArray[np.bool_],
     ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Return two (B, C) int32 by block and cluster: numbers of probe rays, and of those that are unblocked.
+        """Return two (B, C) int32 by block and cluster: numbers of probe rays, and of unblocked probe rays.
 
         Rays whose cosine at the texel or at the emitter is not positive are not cast and not counted.
 
