@@ -31,12 +31,13 @@ ROW_LENGTH = 16
 
 
 class AlphaTable(NamedTuple):
-    """The K triangles whose opacity is below 1 somewhere.
+    """The K triangles of MASK and BLEND materials whose opacity may be below 1 somewhere.
 
     Attributes
     ----------
     slot : (T,) int32
-        Row in `row` of each triangle of the scene, -1 for opaque triangles; (0,) if all triangles are opaque.
+        Row in `row` of each triangle of the scene, -1 for all other triangles, which are opaque;
+        (0,) if K is 0.
     row : (K, 16) float32
         Data of these triangles, columns UV to SURFACE.
     """

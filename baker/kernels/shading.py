@@ -31,7 +31,7 @@ class Shading(NamedTuple):
     material : (T,) int32
         Material of each triangle.
     alpha : AlphaTable
-        Triangles that let light through.
+        Triangles whose opacity may be below 1 somewhere.
     metallic, roughness : (M,) float32
         Metallic and roughness factors. Bakes read neither these two arrays nor the two arrays below.
     reflection_texture : (M,) int32

@@ -50,7 +50,8 @@ def multiply_by_cone(direction, outer, scale, ray, weight):  # type: ignore[no-u
     """Multiply the weights by the angular fall-off of a spot light.
 
     direction : (3,) float64, unit axis of the cone, world
-    outer, scale : float, cosine of the outer angle, and 1 / (cosine of the inner angle - `outer`)
+    outer, scale : float, cosine of the outer angle, and 1 / (cosine of the inner angle - `outer`), at
+        most 1000
     ray : (n, 16, 4) float32, see `FillRays`; read
     weight : (n, 16) float32, see `FillRays`; changed in place
     """

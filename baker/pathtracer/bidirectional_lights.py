@@ -4,7 +4,8 @@
 A light is chosen as in `pathtracer.light_table`. A light subpath starts,
 
 - at an emitter: from a uniformly chosen point, in a cosine-weighted direction;
-- at a light with a position: from that position, in a direction uniform over its cone;
+- at a light with a position: from that position, in a direction uniform over its cone. The cone of a point
+  light is the whole sphere;
 - for parallel light and the sky: from a uniformly chosen point of a disc in front of the scene. The disc has
   the radius of the scene's bounding sphere (`Reference.sphere`).
 
@@ -222,7 +223,6 @@ def start_on_disc(path, lane, sphere, dx, dy, dz, u, w):
     """Write the start of a light subpath of direction d: a uniform point on a disc in front of the scene.
 
     The disc is perpendicular to d and touches the scene's bounding sphere.
-
 
     path : (N_ROWS_BOTH, n) float64; sphere : (4,) float64, `Reference.sphere`
     u, w : random numbers in [0, 1)

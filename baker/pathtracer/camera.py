@@ -67,7 +67,7 @@ def look_at(position: tuple[float, float, float], target: tuple[float, float, fl
     if not math.isfinite(length):
         raise SettingsError("position and target are too far apart", object="camera")
     forward = np.subtract(target, position) / length
-    # If the view is along +Y or -Y, use -Z as the up direction of the picture.
+    # If the view is nearly along +Y or -Y, use -Z as the up direction of the picture.
     hint = np.array([0.0, 1.0, 0.0]) if abs(forward[1]) < 0.99999 else np.array([0.0, 0.0, -1.0])
     right = np.cross(forward, hint)
     right /= np.linalg.norm(right)

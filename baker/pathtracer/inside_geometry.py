@@ -43,7 +43,7 @@ def is_inside_geometry(views: Views) -> NDArray[np.bool_]:
     Parameters
     ----------
     views : Views
-        Counts of the points, from `look_around`.
+        Counts of the points, from `cast_around`.
 
     Returns
     -------

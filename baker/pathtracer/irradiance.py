@@ -28,7 +28,7 @@ from baker.pathtracer.rng import seed_salt
 from baker.pathtracer.scene import Reference
 from baker.trace.packets import arguments_of
 
-# Number of points of a tile.
+# Number of points of a tile of `irradiance_pass`.
 _TILE = 128
 
 

@@ -59,8 +59,9 @@ def alike_within(max_distance: np.float32, min_offset_scale: np.float32) -> np.f
 def are_dense(position: NDArray[np.float64], alike: float) -> bool:
     """Return whether most points (n, 3) are closer than `alike`, metres, to the next point of the array.
 
-    About `_LOOK` points, evenly distributed over the array, are examined. Sorting with `near_together` saves
-    time only if the result is True, because packets of distant points are not traced as coherent.
+    The distance of two points is the largest of its three components. About `_LOOK` points, evenly
+    distributed over the array, are examined. Sorting with `near_together` saves time only if the result is
+    True, because packets of distant points are not traced as coherent.
     """
     first = np.arange(0, len(position) - 1, max(len(position) // _LOOK, 1))
     step = abs(position[first + 1] - position[first]).max(axis=1)

@@ -67,8 +67,9 @@ TO_LIGHT, MAX_DISTANCE, VALUE, B1, B2 = (ROWS + i for i in (33, 36, 37, 40, 41))
 TRIANGLE, LIGHT_ROW = ROWS + 42, ROWS + 65
 N_ROWS = ROWS + 85
 BLOCK = N_ROWS * _L
-# BINS: number of packets of pending shadow rays; rays to the same light share a packet. Rows of such a packet
-# after the 12 rows of its rays: contribution if nothing blocks the ray (3), `POINT` of its path.
+# BINS: number of packets of pending shadow rays. Rays to the same light are in the same packet; with more
+# than eight lights, several lights share a packet. Rows of such a packet after the 12 rows of its rays:
+# contribution if nothing blocks the ray (3), `POINT` of its path.
 BINS = 8
 BIN_VALUE, BIN_POINT, BIN_ROWS = 12, 15, 16
 

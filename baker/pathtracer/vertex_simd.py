@@ -90,7 +90,6 @@ def offset_and_frame(s, base, lane, x, y, z, min_offset_scale, size):
 
     The origin is (x, y, z), offset along `NORMAL`. The tangent frame is about `SHADED`.
 
-
     s : blocks, float32, with `NORMAL` and `SHADED` of the lane
     base : index of the block's first number
     min_offset_scale, size : float32, metres, see `vertex.offset_origin`

@@ -2,7 +2,8 @@
 
 Numba compiles a cached kernel again only if the file of the kernel has changed. The functions compiled into
 the kernel may be in other files. If only these files change, Numba runs outdated code. Therefore, importing a
-package with kernels deletes the cache files that are older than any source file they may depend on.
+package with kernels deletes the index files of the cache that are older than any source file on which the
+kernels may depend.
 
 If no cache folder is writable, for example in a read-only install, Numba raises an error for functions with
 `cache=True`. In that case, `allow_no_cache` replaces a method of Numba's classes of compiled functions, and

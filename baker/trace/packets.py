@@ -42,7 +42,7 @@ BLEND_GEOMETRY = np.uint32(2)
 # with index n - 1.
 #
 #     scene of all triangles     0             the ray stops with probability a
-#                                n = 1 to 16   the ray passes, t is multiplied by T
+#                                n = 1 to 16   the ray stops if a = 1, else it passes and t is multiplied by T
 #                                UNAWARE       the ray stops if a = 1, else it passes
 #                                SOLID         the ray passes if a = 0, else it stops
 #     scene of BLEND triangles   n = 1 to 16   the ray passes, t is multiplied by lerp(1, c, a)

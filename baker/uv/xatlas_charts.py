@@ -186,7 +186,11 @@ def _true_to_size(
 def _drop_flat(
     uv: NDArray[np.float64], area: NDArray[np.float64], chart: NDArray[np.int32]
 ) -> NDArray[np.int32]:
-    """Return renumbered charts (T,) int32: -1 for charts with faces that are flipped or without area in uv.
+    """Return renumbered charts (T,) int32: -1 for charts that are folded or lack area in uv.
+
+    A chart gets -1 if more than a thousandth of its area is flipped, if faces with more than a thousandth of
+    its area in space have almost no area in uv, or if its signed uv area is not finite or less than half of
+    its area in space.
 
     uv : (T, 3, 2), corners; area : (T,), areas of the triangles in space; chart : (T,)
     """

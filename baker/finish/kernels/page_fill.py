@@ -99,9 +99,9 @@ def reflect_outwards(value, chart, covered, nearest, plane_row, plane, max_dista
 
     Let q be the covered texel nearest to an empty texel p. Let m be the mirror texel: the texel of q's chart
     on the other side of q, at the same distance from q as p. Then value(p) = value(m) * plane(p) / plane(m),
-    where the plane is fitted at q. So the noise has the same statistics on both sides of the border, and
-    gradients continue. If the chart is thinner than the distance from p to q, m is found by repeated
-    reflection at the chart's two borders.
+    where the plane is fitted at q, and the quotient of the planes is limited to 1 / `MOST` to `MOST`. So the
+    noise has the same statistics on both sides of the border, and gradients continue. If the chart is thinner
+    than the distance from p to q, m is found by repeated reflection at the chart's two borders.
 
     Parameters
     ----------

@@ -1,10 +1,12 @@
 # mypy: disable-error-code="no-untyped-def"
 """Kernels that limit the change of a denoised page by the standard error of its noisy samples.
 
-1. The mean difference between the noisy and the denoised page over a window of 5 x 5 texels is limited to
-   `MEAN_SIGMAS` times the standard error of this mean, because a denoiser should remove noise but no light.
-2. The change of each texel is limited to `TEXEL_SIGMAS` times its standard error, and the result to the range
-   of the noisy values in the window.
+1. The weighted mean difference between the noisy and the denoised page over a window of 5 x 5 texels is
+   limited to `MEAN_SIGMAS` times the standard error of this mean, because a denoiser should remove noise but
+   no light.
+2. The change of each texel is limited to `TEXEL_SIGMAS` standard errors, and the result to the range of the
+   noisy values in the window. The standard error is the texel's own, or the weighted RMS of the standard
+   errors in the window if that is larger.
 3. The result and the noisy value are averaged, weighted by inverse variance. So a converged page does not
    change.
 """
@@ -23,7 +25,7 @@ RADIUS = 2
 # Largest mean difference of a window that is attributed to noise, as a multiple of the standard error of this
 # mean.
 MEAN_SIGMAS = 2.5
-# Largest change of a texel, as a multiple of its standard error.
+# Largest change of a texel, as a multiple of the standard error of step 2 above.
 TEXEL_SIGMAS = 5.0
 # Assumed relative error of the filter itself. On noise-free pages with contact shadows, 0.1 to 0.5 % was
 # measured.

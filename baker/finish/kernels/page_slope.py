@@ -154,7 +154,8 @@ def _trend(value, chart, covered, r, c, x, y, trend):
 
     Both limits are derived from the two differences between the last three texels, which end at (r, c) in
     that direction (see `STEEP`). If the two differences have different signs, as at shadow edges, between
-    different faces and in noise, both limits are 0.
+    different faces and in noise, both limits are 0. They are also 0 if the chart does not cover all three
+    texels.
 
     value : (H, W, C) float32; chart : (H, W) int32; covered : (H, W) bool
     trend : (C, 2) float64 output, columns RISE and FALL, both >= 0

@@ -1,6 +1,6 @@
 """Spot light: a point light of I candela whose intensity falls off between an inner and an outer cone.
 
-    E = I cos(theta) / r^2 * clamp((cos a - cos outer) / (cos inner - cos outer), 0, 1)^2
+    E = I cos(theta) / r^2 * clamp((cos a - cos outer) / max(cos inner - cos outer, 0.001), 0, 1)^2
         * clamp(1 - (r / range)^4, 0, 1)
 
 r is the distance, and a the angle between the spot's axis and the direction from the light to the point.

@@ -3,10 +3,10 @@
 
     E = 1/n sum L cos / (p_light + (n_hemisphere / n) p_cosine)
 
-The sum is over the n shadow rays, with the radiance L of the emitter and the cosine at the texel. p are
-probability densities per steradian. The balance heuristic combines these light samples with n_hemisphere
-cosine-weighted rays, some of which hit the same emitters (`emitter_hit`). If no shadow ray of sixteen
-neighbouring texels is blocked and the emitters are few, untextured and opaque, the closed form of
+The sum is over the unblocked rays of n shadow rays, with the radiance L of the emitter and the cosine at the
+texel. p are probability densities per steradian. The balance heuristic combines these light samples with
+n_hemisphere cosine-weighted rays, some of which hit the same emitters (`emitter_hit`). If no test ray of
+sixteen neighbouring texels is blocked and the emitters are few, untextured and opaque, the closed form of
 `radiosity.kernels.polygon_light` replaces both estimates.
 
 Based on: Veach and Guibas, Optimally combining sampling techniques, 1995.
@@ -197,11 +197,12 @@ def light_samples(
 ):
     """Add the irradiance of texels from light samples; return the number of shadow rays cast.
 
-    Early out: first, one test ray is traced from each point of sixteen neighbouring texels. If none of these
-    up to 256 rays is blocked, the texels are treated as unoccluded: their other rays are not traced. If in
-    truth the share p of the light is blocked, the expected error is p (1 - p)^256 of the light, at most 0.15
-    %. If the emitters are few, untextured and opaque, the closed form replaces the samples of unoccluded
-    texels. Hemisphere rays that hit these emitters then add nothing.
+    Early out, with 32 or more samples: first, one test ray is traced from each point of sixteen neighbouring
+    texels. If none of these up to 256 rays is blocked, and at least `_MIN_TESTS` rays per texel were traced,
+    the texels are treated as unoccluded: their other rays are not traced. If in truth the share p of the
+    light is blocked, the expected error with 256 test rays is p (1 - p)^256 of the light, at most 0.15 %. If
+    the emitters are few, untextured and opaque, the closed form replaces the samples of unoccluded texels.
+    Hemisphere rays that hit these emitters then add nothing.
 
     origin, normal : (m, 16, 3) float32, metres and unit vectors, world; points of m texels
     emitters : TileEmitters; shading : Shading or None, from `kernels.emitters.needed_shading`

@@ -34,7 +34,8 @@ def join_linked(link, root):
 def flood_regions(chart, region, queue):
     """Assign to each texel without a region the region of the nearest texel of its chart.
 
-    Distances are numbers of steps between texels that share an edge, within the chart.
+    Distances are numbers of steps between texels that share an edge, within the chart. A texel from which no
+    such path leads to a region keeps -1.
 
     chart : (H, W) int32, chart of each texel of a page, -1 for empty texels
     region : (H, W) int32, region of each texel; on entry, -1 for texels without a region

@@ -1,17 +1,18 @@
 # mypy: disable-error-code="no-untyped-def"
 """The filter function of MASK and BLEND triangles, which accepts or rejects ray hits.
 
-A hit on a MASK triangle is accepted if alpha is at least the cutoff. For a hit on a BLEND triangle of alpha a
-and colour c, the ID of the ray decides:
+A hit on a MASK triangle is accepted if alpha is at least the cutoff. A hit on a BLEND triangle of alpha a and
+colour c is accepted if a is 1, and rejected if a is 0. For other a, the ID of the ray decides:
 
 - Shadow rays (ID 1 to 16, the ray's number): `packets.BlendBuffers.transmittance` is multiplied by
   T = (1 - a) lerp(1, c, a), and the hit is rejected. So Embree calls the filter for every crossing of the
-  ray, in any order.
-- Rays that pass BLEND surfaces (ID `packets.UNAWARE`): the hit is accepted only if a is 1.
-- Rays between points of a texel (ID `packets.SOLID`): the hit is accepted if a is above 0.
+  ray, in any order. If the transmittance falls below `_DARK`, the hit is accepted, which blocks the ray.
+- Rays that pass BLEND surfaces (ID `packets.UNAWARE`): the hit is rejected.
+- Rays between points of a texel (ID `packets.SOLID`): the hit is accepted.
 - Other rays (ID 0): the hit is accepted with probability a. The random number is a hash of the bits of the
-  ray and of the triangle's number. So a ray has the same result in any packet and on any thread. Decisions
-  for different surfaces or different rays are independent.
+  ray and of the triangle's number; at an edge, the connected surface replaces the triangle's number. So a ray
+  has the same result in any packet and on any thread. Decisions for different surfaces or different rays are
+  independent.
 
 Based on: Enderton et al., Stochastic transparency, 2010; Embree 4 API reference, RTCFilterFunctionN.
 """
