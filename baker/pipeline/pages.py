@@ -13,6 +13,7 @@ from baker.core.atlas import Atlas
 from baker.core.lightmap import BakeResult, TexelStatus
 from baker.core.parallel import thread_count
 from baker.core.progress import Progress, report
+from baker.core.readable import number
 from baker.core.scene import Scene, SceneWarning
 from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
@@ -139,8 +140,8 @@ def convergence_warnings(status: NDArray[np.uint8]) -> list[SceneWarning]:
     if noisy <= UNCONVERGED_SHARE * surface:
         return []
     message = (
-        f"{100 * noisy / surface:.2g} % of the texels did not converge: their standard error before denoising"
-        f" is above {100 * UNCONVERGED:.0f} % of their value; raise `quality` or `samples`"
+        f"{number(100 * noisy / surface)} % of the texels did not converge: their standard error before"
+        f" denoising is above {100 * UNCONVERGED:.0f} % of their value; raise `quality` or `samples`"
     )
     return [SceneWarning("not-converged", message)]
 

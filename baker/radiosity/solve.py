@@ -33,6 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.progress import Progress, report
+from baker.core.readable import number
 from baker.core.scene import SceneWarning
 from baker.core.stage import Stage
 from baker.radiosity.form_factors import FormFactorMatrix
@@ -182,7 +183,7 @@ def solve_warnings(solution: Solution) -> list[SceneWarning]:
     if solution.patch_error <= TOLERANCE:
         return []
     message = (
-        f"bounced light is exact to {100 * solution.patch_error:.2g} % only: the solve ended after"
+        f"bounced light is exact to {number(100 * solution.patch_error)} % only: the solve ended after"
         f" {solution.iterations} iterations; lower base colours near 1 in closed rooms, or set `bounces`"
     )
     return [SceneWarning("solve-not-converged", message)]
