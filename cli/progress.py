@@ -31,8 +31,8 @@ class Reporter:
     quiet : bool
         Whether nothing is shown.
     stopped : callable
-        A function without arguments that returns whether a stopping signal has arrived. A `Reporter` returns
-        its result, which cancels the work if it is true.
+        A function without arguments that returns whether a stopping signal has arrived. If it has, the
+        next report of progress cancels the work.
     stream : TextIO
         Stream on which progress is shown; by default stderr.
     clock : callable

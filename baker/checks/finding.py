@@ -48,7 +48,7 @@ class RawFinding:
     percent : float or None
         Share of the object that is defective, percent.
     primitive : int or None
-        Index of the primitive of the first defective face, in its mesh.
+        Index, in the mesh, of the primitive that contains the first defective face.
     faces : tuple of int
         Up to `MOST_FACES` defective faces, as numbers within their primitive.
     pairs : tuple of (int, int)
@@ -118,7 +118,7 @@ class Finding:
 
 
 def finding_json(finding: Finding) -> dict[str, Any]:
-    """Return a finding as JSON values. Optional keys (`percent` and later) without a value are left out."""
+    """Return a finding as JSON values. Keys without a value are left out."""
     found = finding.found
     value: dict[str, Any] = {
         "code": finding.code,

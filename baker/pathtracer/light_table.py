@@ -44,7 +44,8 @@ from baker.pathtracer.emitters import (
 from baker.trace.jit import inner
 
 _LUMINANCE = np.array(LUMINANCE_WEIGHTS)
-# Columns of a light without area, from its `EmissionProfile`:
+# Columns of a light without area, from its `EmissionProfile`. A quantity has one column, or as many as the
+# number in parentheses says:
 #
 #     DELTA_FORM            form of the profile: EVEN, CONE, PARALLEL or TABULATED
 #     DELTA_POSITION        metres, relative to the geometry's origin; 0 for parallel light (3)
@@ -71,7 +72,7 @@ DELTA_TABLE, DELTA_COSINES, DELTA_AZIMUTHS = 17, 18, 19
 DELTA_COLUMNS = 20
 # Values of DELTA_FORM.
 EVEN, CONE, PARALLEL, TABULATED = 0.0, 1.0, 2.0, 3.0
-# Columns of any light in `LightTable.row`, which `vertex_simd` reads:
+# Columns of any light in `LightTable.row`, which `vertex_simd` reads. Numbers in parentheses as above:
 #
 #     ROW_ORIGIN          corner 0 of an emitter, position of a light, or direction towards parallel light (3)
 #     ROW_EDGE            the two edges at corner 0 of an emitter; 0 for other lights (6)
@@ -91,7 +92,7 @@ ROW_COLUMNS = 20
 # tabulated light, it first multiplies ROW_GAIN by the fall-off, and then treats the light as KIND_EVEN.
 KIND_EMITTER, KIND_EVEN, KIND_CONE, KIND_PARALLEL, KIND_SKY, KIND_TABULATED = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
 _ROW_KIND = {EVEN: KIND_EVEN, CONE: KIND_CONE, PARALLEL: KIND_PARALLEL, TABULATED: KIND_TABULATED}
-# Columns of the sky: radiance, cd/m2 (3); probability with which it is chosen.
+# Columns of the sky: radiance, cd/m2, three columns; probability with which it is chosen.
 SKY_RADIANCE, SKY_CHANCE = 0, 3
 # FAR: length of rays to parallel light and to the sky, metres. SHORT: length of rays to other lights, as a
 # share of the distance to the light.
@@ -111,9 +112,9 @@ class LightTable(NamedTuple):
     triangle : (E,) int32
         Triangle of the scene that contains each emitter.
     code : (T,) int32
-        For each triangle of the scene, the code of its emitters, see `FoundEmitters`.
+        For each triangle of the scene, a number for its emitter or its parts, see `FoundEmitters.code`.
     node : (K, 4) int32
-        Codes of the parts of divided triangles, see `FoundEmitters`.
+        For each division of a triangle into four parts, a number for each part, see `FoundEmitters.node`.
     cumulative : (E + P + 1,) float64
         Cumulative probabilities of the lights. The last is 1, or 0 if nothing emits.
     sky : (4,) float64
@@ -284,7 +285,7 @@ def _chances(power: NDArray[np.float64], groups: list[slice]) -> NDArray[np.floa
     """Return the probability (n,) of each of n lights with power (n,); all 0 if no light has power.
 
     Half of the total is distributed in proportion to power. The other half is divided equally among the
-    groups that have power and, inside a group, in proportion to power.
+    groups that have power. Inside a group, it is divided in proportion to power.
     """
     total = power.sum()
     if not total > 0:
@@ -361,10 +362,10 @@ def on_whole_triangle(emitter, e, b1, b2):  # type: ignore[no-untyped-def]
 
 @inner
 def emitter_density(emitter, e, dx, dy, dz):  # type: ignore[no-untyped-def]
-    """Return the density per steradian with which light sampling chooses the point of emitter e at vector d.
+    """Return the density per steradian with which light sampling chooses a point of emitter e.
 
-    The density includes the emitter's probability. It is 0 if the side that faces the origin of d does not
-    emit.
+    The vector (dx, dy, dz) leads from the shaded point to that point. The density includes the emitter's
+    probability. It is 0 if the side that faces the shaded point does not emit.
 
     emitter : (E, 24) float64, see `pathtracer.emitters`; dx, dy, dz : metres, vector to the point
     """
@@ -421,7 +422,7 @@ def range_window(square, inverse_range):  # type: ignore[no-untyped-def]
 
 @inner
 def falloff(lights, e, cosine, dx, dy, dz):  # type: ignore[no-untyped-def]
-    """Return the fall-off f of light e, which has a position, in a direction; see `EmissionProfile`.
+    """Return the fall-off f of light e in a direction, see `EmissionProfile`. The light must have a position.
 
     lights : `LightTable`; dx, dy, dz : unit direction from the light
     cosine : cosine of the angle between that direction and the light's axis
@@ -451,8 +452,8 @@ def tabulated(table, delta, e, cosine, dx, dy, dz):  # type: ignore[no-untyped-d
     r = min(max((cosine - low) / max(1.0 - low, 1.0e-12), 0.0), 1.0) * (rows - 1)
     i = min(np.int64(r), rows - 2)
     r -= i
-    # Compute the column of the table from the azimuth, which increases from the tangent towards axis x
-    # tangent.
+    # Compute the column of the table from the azimuth. It increases from the tangent towards
+    # cross(axis, tangent).
     start = np.int64(delta[e, DELTA_TABLE]) + i * columns
     j = next_j = np.int64(0)
     q = 0.0

@@ -31,7 +31,7 @@ _NONE = np.zeros(0, np.int32)
 
 @dataclass(frozen=True)
 class _Cut:
-    """A mesh to cut, after its positions are multiplied by the symmetric matrix `stretch` (3, 3).
+    """A mesh to cut. First, its positions are multiplied by `stretch`, a symmetric (3, 3) matrix.
 
     All instances with the same mesh and stretch share their charts.
     """
@@ -121,7 +121,10 @@ def _lay_out(
     usable: NDArray[np.bool_],
     warnings: tuple[SceneWarning, ...],
 ) -> Atlas:
-    """Cut the instances whose TEXCOORD_1 is not `usable` (I,) bool, and pack all instances."""
+    """Cut the instances whose TEXCOORD_1 is not usable, and pack all instances.
+
+    usable : (I,) bool, see `KeptUv`
+    """
     # Leave out instances without triangles.
     filled = [k for k, i in enumerate(scene.instances) if len(scene.meshes[i.mesh].triangle)]
     # With the setting `density`, all instances have this density.
@@ -259,7 +262,7 @@ def _world_stretch(world_from_object: NDArray[np.float64]) -> tuple[float, NDArr
 
 
 def _rigid(mesh: Mesh, instance: Instance, share: float) -> RigidInstance:
-    """Return the placement of an instance whose TEXCOORD_1 is kept, and only moved and scaled.
+    """Return the placement of an instance that keeps its TEXCOORD_1. Packing moves and scales it as a whole.
 
     share : factor on the density of the instance
     """

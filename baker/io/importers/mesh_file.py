@@ -108,7 +108,7 @@ def _arrays(
 
 
 def _colour(value: Any, count: int) -> NDArray[np.float32] | None:
-    """Return vertex colours (V, 4), linear Rec.709 and alpha, or None unless each vertex has a colour."""
+    """Return vertex colours (V, 4), linear Rec.709 and alpha; None if a vertex has no colour."""
     if value is None or len(value) != count:
         return None
     stored = np.array(value)

@@ -1,8 +1,8 @@
 # mypy: disable-error-code="no-untyped-def"
 """Computes irradiance and ambient occlusion of texels for the final gather, from n rays of each texel.
 
-    E_indirect = pi / n sum M / pi            M: radiosity of the texel at the ray's hit, without emission
-    E_sky      = pi / n sum L_sky         over rays that leave the scene, L_sky: radiance
+    E_indirect = (pi / n) sum (B / pi)    B: radiosity of the texel at the ray's hit, without emission
+    E_sky      = (pi / n) sum L_sky       over rays that leave the scene; L_sky: radiance
     E_emitted  = sum of MIS-weighted hits of emitters, if `area_light` did not use the closed form
     AO         = share of rays without a hit within a distance
 
@@ -76,8 +76,8 @@ def gather(
     sobol_points : (n, 2) uint32, one row per ray; shared : uint32, from `kernels.sampling.shared_bits_mask`
     sky : (3,) float32, radiance, cd/m2
     limits : (2,) float64, AO distance in metres, and number of shadow rays for the MIS weights
-    analytic : (m,) uint8, 1 for texels to which hits of emitters add nothing; emitters of the separate
-        stratum (`TileEmitters.apart`) still add their light
+    analytic : (m,) uint8, 1 for texels whose light from emitters has a closed form; their rays add only the
+        light of emitters in `TileEmitters.apart`
     out : (m, 8) float32 output, columns INDIRECT, DIRECT, OPEN and SQUARE; irradiance in lx
     """
     n_samples = len(sobol_points)
@@ -102,8 +102,8 @@ def gather(
     hits, split = new_hits(), _counts()
     seeds, frame = new_seeds(), new_frame()
     distance = _f(limits[0])
-    # At the end, all sums of light are multiplied by pi / n. Therefore radiosity is divided by pi here, and
-    # the result of `emitter_hit` is multiplied by n / pi.
+    # The sums are of radiance, and at the end they are multiplied by pi / n. Radiosity divided by pi is
+    # radiance. Radiance times `emitter_hit` is irradiance already, so it is multiplied by n / pi.
     inverse_pi = _f(1.0 / np.pi)
     lit = len(exitance) > 0
     whole = n_samples / np.pi
@@ -127,8 +127,8 @@ def gather(
                     part[j] = _f(0.0)
                 for lane in range(PACKET_WIDTH):
                     missed[lane] = _f(0.0)
-            # Trace one ray of each texel. `trace_gather` explains the two turns of scenes with BLEND
-            # surfaces. If no ray of turn 0 stops at a BLEND surface, turn 1 reuses the hits of turn 0.
+            # Trace one ray of each texel. In a scene with BLEND surfaces, it is traced twice, see
+            # `trace_gather`. If no ray of turn 0 stops at a BLEND surface, turn 1 reuses the hits of turn 0.
             if turn == 0 or stopped:
                 aim_lanes(rays, words, frame, seeds, sobol_points[s, 0], sobol_points[s, 1], shared, FAR)
                 trace_gather(
@@ -276,8 +276,8 @@ def estimate_occlusion(origin, normal, buffers, begin, sobol_points, shared, dis
     begin : number of the first texel, which seeds the random numbers and is the index in `out`
     sobol_points : (n, 2) uint32, one row per ray; shared : uint32, from `kernels.sampling.shared_bits_mask`
     distance : float32, length of the rays, metres
-    early_out : number of rays per texel after which sixteen texels are finished, if at most one ray of each
-        texel was blocked; 0 disables the early out
+    early_out : number of rays per texel after which a group of sixteen texels ends early if each of its
+        texels had at most one blocked ray; 0: groups never end early
     out : (n_entries,) float32 output; items begin to begin + m - 1 are written
     """
     n_samples = len(sobol_points)

@@ -1,4 +1,4 @@
-//! Adds lightmaps to the objects of a baked scene, for Bevy 0.16 and newer.
+//! Adds lightmaps to the objects of a baked scene, for Bevy 0.16 to 0.20 (compiled with 0.20.1).
 //!
 //! Call `app.add_plugins(BakerLightmapsPlugin { folder: "bevy".into() })`, and spawn `scene.glb` as usual. Each baked
 //! scene has its own file: give the files different names.
