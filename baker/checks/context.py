@@ -125,9 +125,9 @@ class CheckContext:
     def box(self) -> NDArray[np.float64]:
         """Return a box around all good triangles, (2, 3) float64, metres, world: lowest and highest corner.
 
-        The box also contains the corners of the bounding box that each mesh has in object space, so it is
-        larger than the bounding box if instances are rotated. Without good triangles the corners are +inf
-        and -inf.
+        It contains the corners of the object-space bounding box of each mesh, transformed to world space. If
+        instances are rotated, it can therefore be larger than the tightest box around the triangles. Without
+        good triangles the corners are +inf and -inf.
         """
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for instance in self.source.instances:
@@ -176,7 +176,7 @@ class CheckContext:
 
     @property
     def lit(self) -> bool:
-        """Return whether a light without area or the sky emits light."""
+        """Return whether the sky, or any light without area, emits light."""
         bright = [max(light.intensity) for light in self.scene.lights]
         return max([*bright, *self.settings.sky_radiance], default=0.0) > 0
 

@@ -40,7 +40,7 @@ _TOGETHER = 0.125
 # computed from a smaller version of their texture. FEW_CROSSED: limit of the number of texel lines that the
 # edges of one part cross. Up to this limit, the part always uses the full resolution.
 MOST_CROSSED, FEW_CROSSED = 4.0e6, 64.0
-# Share of the remaining number of texel lines that each round of cutting may cross, even if many rounds
+# Smallest share of the remaining number of texel lines that a round of cutting may cross, however many rounds
 # follow.
 _ROUND = 0.25
 # Number of texel lines that the parts of one call of the kernel cross. Signals such as Ctrl-C are handled
@@ -174,7 +174,7 @@ class EmissiveTextures:
 def brightness(radiance: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean of R, G and B of radiances.
 
-    This function replaces luminance, with which parts that emit blue would get few samples.
+    It is used instead of luminance, because luminance would give few samples to parts that emit blue.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def cut(
         Size (see `Parts.inside`). Parts up to this size that are at most one texel wide are treated as
         uniform.
     most : int
-        Largest number of parts, minus n.
+        Largest number of parts that the cuts may add to the n triangles.
 
     Returns
     -------

@@ -2,7 +2,8 @@
 
     F_ij = share of the light leaving patch i that arrives at patch j
     A_i F_ij = A_j F_ji                         A: patch area
-    sum_j F_ij + sky_i + lost_i = 1 sky, lost: shares of rays that leave the scene, or end at no patch
+    sum_j F_ij + sky_i + lost_i = 1             sky: share of rays that leave the scene
+                                                lost: share of other rays that end at no patch
 
 Each F_ij is merged with its reciprocal estimate A_j F_ji / A_i. Merging changes the row sums. Therefore the
 matrix is then balanced: it is scaled so that its row sums are again close to the measured row sums. The
@@ -41,8 +42,8 @@ from baker.radiosity.trace_job import TraceJob
 _TILE = 256
 # Largest number of passes of `sinkhorn_balance` over all rows.
 _BALANCE_STEPS = 30
-# Uncertainty of the measured row sum of a patch whose rays all miss other patches, as a number of rays. For
-# other patches, it is multiplied by the share of rays that miss all patches.
+# Uncertainty of a measured row sum, as a number of rays, for a patch none of whose rays hits a patch. If a
+# share of its rays hits no patch, the uncertainty is this number times that share.
 _SLACK = 4.0
 
 
@@ -125,8 +126,8 @@ def build_form_factors(patches: PatchSet, seen: SeenPatch, job: TraceJob, *, n_r
     merged = _merged(first, rows.column, value, patches.area)
     if rows.passed is None or rows.sky_passed is None:
         return _balanced(merged, patches.area, sky, lost, n * n_rays)
-    # Compute the mean transmittance over the rays of both estimates: merged sums of transmittance divided by
-    # merged form factors, before balancing.
+    # For each pair of patches, compute the mean transmittance over the rays in both directions. It is the
+    # merged sum of transmittance divided by the merged form factor, both before balancing.
     transmittance = np.ones((len(merged.value), 3), np.float32)
     for c in range(3):
         part = (rows.passed[:, c] / np.float32(n_rays)).astype(np.float32)
@@ -235,8 +236,9 @@ def cast_rows(patches: PatchSet, seen: SeenPatch, job: TraceJob, *, n_rays: int)
 def _starts_of(patches: PatchSet, n_rays: int) -> NDArray[np.int64]:
     """Return (n,) int64: the number of rays that start from each texel entry in `patches.member`.
 
-    An entry gets rays in proportion to its area. If the first entries of a patch cover the share c of its
-    area, they get the rays k with (k + 0.5) / n_rays <= c.
+    The rays of a patch go to its entries in order, in proportion to their areas. For each m, if the first m
+    entries together cover the share c of the patch's area, they get the rays k with
+    (k + 0.5) / n_rays <= c.
     """
     owner = np.repeat(np.arange(patches.n), np.diff(patches.first))
     running = np.floor((owner + np.minimum(patches.cumulative.astype(np.float64), 1.0)) * n_rays + 0.5)

@@ -35,7 +35,8 @@ def planar_charts(
     """
     corner = position[triangle]
     cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    # Join faces that share an edge if their normals are closest to the same axis direction, of six.
+    # Join faces that share an edge if, of the six directions +x, -x, +y, -y, +z and -z, the same one is
+    # closest to both normals.
     axis = np.abs(cross).argmax(axis=1)
     side = 2 * axis + (np.take_along_axis(cross, axis[:, None], axis=1)[:, 0] < 0)
     chart = connected_faces(triangle, side)

@@ -19,7 +19,7 @@ def write_junit(path: Path, found: VerifyReport, in_words: Callable[[str], str] 
     found : VerifyReport
         Result of `verify`.
     in_words : callable
-        Converts messages that name settings in backticks, for example to flags of the command line.
+        Replaces the names of settings in backticks in a message, for example by flags of the command line.
 
     Raises
     ------

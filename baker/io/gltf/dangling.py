@@ -19,9 +19,10 @@ NOWHERE = 2**31 - 1
 def break_dangling(document: Json, buffers: tuple[bytes, ...], missing: frozenset[int]) -> None:
     """Replace invalid references to accessors, views and buffers by `NOWHERE`.
 
-    A reference is invalid if the list has no such object. The buffer of a view is also invalid if the view
-    exceeds it, and the view of an accessor if the accessor exceeds it. In extensions, only the members
-    `bufferView`, and `buffer` in extensions of views, are replaced.
+    A reference is invalid if the list has no such object. A view's reference to its buffer is also invalid if
+    the view extends past the end of the buffer, and an accessor's reference to its view if the accessor
+    extends past the end of the view. In extensions, only two members are replaced: `bufferView` in any
+    extension, and `buffer` in the extensions of a view.
 
     Parameters
     ----------
