@@ -43,8 +43,8 @@ class Rates:
     ----------
     ray : dict of Stage to float
         Seconds per ray, for those of `RAY_STAGES` whose speed is known.
-    texel : float
-        Seconds per texel, summed over the stages `BY_TEXEL`.
+    texel : dict of Stage to float
+        Seconds per texel, for those of the stages `BY_TEXEL` whose speed is known.
     triangle : float
         Seconds per triangle, summed over the stages `BY_TRIANGLE`; 0 if unknown.
     basis : str
@@ -52,7 +52,7 @@ class Rates:
     """
 
     ray: Mapping[Stage, float]
-    texel: float
+    texel: Mapping[Stage, float]
     triangle: float
     basis: str
 
@@ -64,7 +64,7 @@ def rates_of_bake(manifest: Mapping[str, Any]) -> Rates:
     ray = {
         stage: timings[stage] / rays[stage] for stage in RAY_STAGES if timings.get(stage) and rays.get(stage)
     }
-    per_texel = sum(timings.get(stage, 0.0) for stage in BY_TEXEL) / max(texels, 1)
+    per_texel = {stage: timings[stage] / max(texels, 1) for stage in BY_TEXEL if timings.get(stage)}
     # The manifest has no number of triangles, so the time per triangle is unknown.
     return Rates(ray, per_texel, 0.0, "an earlier bake")
 

@@ -43,7 +43,7 @@ def stage_seconds(settings: BakeSettings, scene: Path) -> dict[str, float]:
         Settings of the bake.
     scene : Path
         The scene file. If there is a bake of this file in a folder beside it, the estimate uses the rays per
-        second of that bake, and its seconds per texel for the stage `FINISH`.
+        second of that bake, and its seconds per texel for the stages `BY_TEXEL` of `checks.bake_rates`.
 
     Returns
     -------
@@ -62,7 +62,9 @@ def stage_seconds(settings: BakeSettings, scene: Path) -> dict[str, float]:
     for stage, each in _TEXEL_SECONDS.items():
         seconds[stage] = workload.texels * each / threads
     finish = _FINISH_SECONDS + _DENOISE_SECONDS * settings.denoise
-    seconds[Stage.FINISH] = workload.texels * (finish / threads if rates is None else rates.texel)
+    seconds[Stage.FINISH] = workload.texels * finish / threads
+    known = {} if rates is None else rates.texel
+    seconds |= {stage: workload.texels * each for stage, each in known.items() if stage in seconds}
     return {stage: seconds[stage] for stage in Stage if stage in seconds}
 
 

@@ -123,7 +123,7 @@ def probe(context: CheckContext) -> Rates:
         cast += len(direction)
     each = (time.perf_counter() - start) / cast / _OF_PROBE
     texel = _PER_TEXEL_SECONDS / world.threads
-    return Rates(dict.fromkeys(RAY_STAGES, each), texel, 0.0, "a probe of one second")
+    return Rates(dict.fromkeys(RAY_STAGES, each), {Stage.FINISH: texel}, 0.0, "a probe of one second")
 
 
 def seconds_of(cost: Cost, rates: Rates) -> float:
@@ -133,7 +133,7 @@ def seconds_of(cost: Cost, rates: Rates) -> float:
     """
     slowest = max(rates.ray.values(), default=0.0)
     rays = sum(n * rates.ray.get(stage, slowest) for stage, n in cost.rays.items())
-    return rays + cost.texels * rates.texel + cost.triangles * rates.triangle
+    return rays + cost.texels * sum(rates.texel.values()) + cost.triangles * rates.triangle
 
 
 @check(

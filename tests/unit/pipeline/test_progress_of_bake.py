@@ -73,13 +73,14 @@ def test_the_speed_of_an_earlier_bake_of_the_scene_is_used(tmp_path) -> None:
         tmp_path / "out",
         100,
         input={"path": "../a.glb", "sha256": None},
-        timings={"final gather": 5.0, "finish": 2.0},
+        timings={"final gather": 5.0, "finish": 2.0, "texels": 1.0},
         rays={"final gather": 1000},
     )
     found = stage_seconds(BakeSettings(), scene)
     texels = 0.8 * 1024**2
     assert found[Stage.FINAL_GATHER] == pytest.approx(texels * 64 * 0.005, rel=1e-3)
     assert found[Stage.FINISH] == pytest.approx(texels * 0.02, rel=1e-3)
+    assert found[Stage.TEXELS] == pytest.approx(texels * 0.01, rel=1e-3)
     assert found[Stage.DIRECT_LIGHT] == default[Stage.DIRECT_LIGHT]
 
 
