@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.encoding import LARGEST_SIDE
 from baker.core.errors import InputError
 from baker.io.regular_file import read_regular
 
@@ -36,8 +37,6 @@ _UNCOMPRESSED, _ZSTANDARD = 0, 2
 # Compression level of Zstandard. Level 19 makes the file of a furnished room 7 % smaller, and takes ten times
 # as long.
 _EFFORT = 9
-# Largest accepted width and height, texels.
-_LARGEST = 16384
 
 
 def encode_ktx2(code: NDArray[np.uint32], text: Mapping[str, str], writer: str) -> bytes:
@@ -142,8 +141,8 @@ def _decoded(data: bytes) -> tuple[NDArray[np.uint32], dict[str, str]]:
         raise ValueError(f"only flat images of format {_FORMAT} are read; its format is {kind}")
     if scheme not in (_UNCOMPRESSED, _ZSTANDARD):
         raise ValueError(f"its compression {scheme} is neither absent nor Zstandard")
-    if not (1 <= width <= _LARGEST and 1 <= height <= _LARGEST):
-        raise ValueError(f"its size is {width} x {height} texels; at most {_LARGEST} a side are read")
+    if not (1 <= width <= LARGEST_SIDE and 1 <= height <= LARGEST_SIDE):
+        raise ValueError(f"its size is {width} x {height} texels; at most {LARGEST_SIDE} a side are read")
     text = _texts(_part(data, parts[2], parts[3]))
     if text.get("KTXorientation", "rd") != "rd":
         raise ValueError("its rows do not run from top to bottom")
