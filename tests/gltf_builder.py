@@ -40,7 +40,7 @@ class GltfBuilder:
         return self.add("bufferViews", view)
 
     def accessor(self, array: np.ndarray, **extra: Any) -> int:
-        """Append an accessor of an (N,) or (N, width) array and return its index; dtype gives its type."""
+        """Append an accessor of an (N,) or (N, width) array, with its dtype as component type."""
         array = np.ascontiguousarray(array)
         width = 1 if array.ndim == 1 else array.shape[1]
         value = {
@@ -124,7 +124,7 @@ def mesh_glb(position: np.ndarray, triangle: np.ndarray, **attributes: Any) -> b
 
 
 def quad_builder(**material: Any) -> GltfBuilder:
-    """Return a builder with the unit square on node 0; members of a material, if any, give it a material."""
+    """Return a builder with the unit square on node 0. `material` has the members of its material, if any."""
     builder = GltfBuilder()
     extra = {"material": builder.add("materials", dict(material))} if material else {}
     uv = QUAD[:, :2].copy()

@@ -136,7 +136,7 @@ def make_atlas(*layouts: InstanceLayout, resolution: int = 16) -> Atlas:
 
 
 def quad_result(folder: Path, **settings: object) -> BakeResult:
-    """Return a bake of the unit square on two pages of random values."""
+    """Return a bake of the unit square with random values on one page of irradiance and one of AO."""
     folder.mkdir(parents=True, exist_ok=True)
     scene = load_scene(write(folder / "level.glb", quad_builder(name="wall")))
     rng = np.random.default_rng(4)

@@ -42,7 +42,7 @@ def imports(texts):
 
 
 def test_packages_name_what_their_kernels_are_made_of(texts, imports):
-    """If one were not listed, cached kernels would be used although the code compiled into them changed."""
+    """If a package were not listed, a change of its kernels would not recompile the kernels that use them."""
     kernels = {name for name, text in texts.items() if KERNEL.search(text)}
     assert {
         "baker.radiosity.kernels.gather",

@@ -113,8 +113,8 @@ def test_ao_is_the_unoccluded_share_with_a_binomial_error(transport):
     (layer,) = CHANNELS.get("ao").layers(transport)
     np.testing.assert_array_equal(layer.value[:, 0], transport.ambient_occlusion)
     binomial = np.sqrt(transport.ambient_occlusion * (1 - transport.ambient_occlusion) / 64)
-    # If the binomial standard error is above 0.05, the standard error of the layer equals it within 5 %. Also
-    # for an AO of 0 or 1, where the binomial error is 0, the error of the layer is above 0.
+    # If the binomial standard error is above 0.05, the standard error of the layer equals it within 5 %. For
+    # an AO of 0 or 1, the binomial error is 0, but the error of the layer is above 0.
     large = binomial > 0.05
     assert large.sum() > 10
     np.testing.assert_allclose(layer.error[large], binomial[large], rtol=0.05)

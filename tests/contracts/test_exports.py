@@ -140,7 +140,7 @@ def test_web_exports_without_webp_pages_need_no_module_for_them(bake, name):
 
 
 def test_moz_lightmap_holds_the_irradiance(bake, tmp_path):
-    """Texel x intensity is E in both pictures of a page, and each object has the texture of its page."""
+    """Texel x intensity is E in the HDR and the PNG image of a page; each object has its page's texture."""
     from io import BytesIO
 
     from PIL import Image
@@ -160,7 +160,7 @@ def test_moz_lightmap_holds_the_irradiance(bake, tmp_path):
         )
         exact = HdrEncoding().decode(tmp_path / "page.hdr").pixels * intensity
         assert np.abs(exact - light).max() <= light.max() / 256
-        # The brightest 1 % of the PNG are white.
+        # The PNG is clipped at `intensity`; at most 2 % of the texels are brighter.
         levels = np.asarray(Image.open(BytesIO(picture(path, texture["source"])))) / 255.0 * intensity
         assert np.abs(levels - np.minimum(light, intensity)).max() <= 0.51 / 255 * intensity
         assert (light.max(axis=-1) > intensity).mean() <= 0.02
@@ -183,7 +183,7 @@ def picture(path, image):
 
 
 def test_moz_lightmap_keeps_unlit_materials_and_makes_lights_black():
-    """Materials are shared by pages and primitives without a material get one."""
+    """A material on two pages is copied for each page; a primitive without a material gets one."""
     from baker.exporters.moz_lightmap import _add_lightmaps
 
     glb = {

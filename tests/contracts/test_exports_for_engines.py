@@ -124,7 +124,7 @@ def test_bevy_exposure_values():
 
 
 def test_godot_images_hold_scaled_pages_one_below_the_other(bake):
-    """Godot multiplies a lightmap by the albedo and by nothing else."""
+    """Godot multiplies a lightmap by the albedo only, so an image holds E / pi x exposure."""
     folder = bake[0] / "godot"
     pages = [decode_exr(bake[0] / f"irradiance_{page}.exr").pixels for page in range(2)]
     image = decode_exr(folder / "lightmap_0.exr")

@@ -150,7 +150,7 @@ def add_kind(tmp_path, monkeypatch):
 
 
 def test_a_kind_added_by_one_file_is_taken_by_all(tmp_path, add_kind):
-    """The kind "moon" gives the same bake, import, verification, picture and check as "directional"."""
+    """The kind "moon" gives the same bake and picture as "directional"; `verify` and `check` accept it."""
     add_kind("moon", MOON)
     out = tmp_path / "out"
     found = bake(lit_by(shining("moon")), settings=SETTINGS, out=out)
@@ -179,7 +179,7 @@ def test_a_kind_added_by_one_file_is_taken_by_all(tmp_path, add_kind):
 
 
 def test_a_kind_with_a_fall_off_of_its_own_is_taken_by_all(tmp_path, add_kind):
-    """The bake evaluates the kind's kernel, the path tracer the kind's table. `verify` finds them equal."""
+    """The bake evaluates the kind's kernel, the path tracer evaluates its table; `verify` compares them."""
     add_kind("beacon", BEACON)
     out = tmp_path / "out"
     light = replace(shining("beacon", 100.0), parameters={"sharpness": 3.0})

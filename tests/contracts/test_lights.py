@@ -77,7 +77,7 @@ def test_every_kind_has_a_closed_form():
 
 @pytest.mark.parametrize("name", sorted(TRUTH))
 def test_a_record_agrees_with_what_its_light_does(name):
-    """A change of position, direction or cone changes E if and only if `describe` returns that property."""
+    """A change of position, range, direction or cone changes E if and only if `describe` returns it."""
     kind, light, (origin, normal) = LIGHT_KINDS.get(name), light_of(name), points()
     assert kind.name == name
     assert kind.gltf_type is None or kinds_by_gltf_type()[kind.gltf_type] is kind
@@ -225,7 +225,7 @@ def test_odd_points(kind):
     assert fill(kind, none, none)[1].shape == (0, 16)
     at = np.float32(np.tile(POSITION, (1, 16, 1)))
     normal = points(1)[1]
-    # The light gets the float32 position of the points, so they coincide exactly.
+    # The light gets the float32 position of the points, so light and points coincide exactly.
     ray, weight = fill(kind, at, normal, replace(light_of(kind), position=tuple(map(float, at[0, 0]))))
     assert np.isfinite(ray).all()
     assert np.isfinite(weight).all()

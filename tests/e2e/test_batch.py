@@ -178,7 +178,7 @@ def test_stopped_in_the_middle(tree, how):
     wait_for_end(family)
     assert [path.name for path in (tree / "baked").iterdir() if not path.name.endswith(".lock")] == ["hall"]
     if how == "ctrl-c":
-        # A killed process removes nothing; the next batch does.
+        # After Ctrl-C, the batch removes its temporary files. After a kill, the next batch removes them.
         assert hidden(tree) == []
     text = (tree / "JOBS.toml").read_text()
     (tree / "JOBS.toml").write_text(text.replace("4096", "1").replace("65536", "1").replace("1024", "16"))

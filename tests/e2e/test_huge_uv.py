@@ -54,7 +54,7 @@ def test_light_stays_finite(tmp_path: Path, scale: float, transform: float, mate
 
 
 def test_the_light_of_very_many_repeats_is_that_of_their_mean(tmp_path: Path) -> None:
-    """With very many repeats, an emissive square lights a facing square as if it had the texture's mean."""
+    """A square with very many repeats of an emissive texture emits the mean of the texture."""
     mean = [float(x) for x in linear_from_srgb(PIXELS[..., :3] / 255.0).mean((0, 1))]
     found = []
     for scale, factor in ((1e20, [1.0, 1.0, 1.0]), (None, mean)):

@@ -1,8 +1,8 @@
 """`baker verify` with its default limits detects changed maps and faulty bakes.
 
-The scene has two closed rooms side by side, one a thousand times brighter than the other. The reference, the
-path-traced light of some texels, is traced once and compared with every changed map. Its values do not depend
-on the maps; only the choice of the texels would depend on them.
+The scene has two closed rooms side by side, one a thousand times brighter than the other. The reference is
+the path-traced light of some texels. It is traced once and compared with every changed map. For a changed
+map, `verify` would choose other texels, but the path-traced light of a texel does not depend on the map.
 """
 
 from __future__ import annotations
@@ -307,7 +307,7 @@ def forgetful(find):
 
 @pytest.mark.parametrize("both", [False, True], ids=["the bake's", "both"])
 def test_an_emitter_that_a_finder_forgets_is_missed(tmp_path, monkeypatch, both):
-    """`verify` detects an emitter missed by the bake's finder or by both, since reference rays hit it."""
+    """`verify` detects an emitter that its own finder leaves out, too, because reference rays hit it."""
     monkeypatch.setattr("baker.pipeline.prepare.build_emitters", forgetful(build_emitters))
     if both:
         monkeypatch.setattr("baker.pathtracer.light_table.find_emitters", forgetful(find_emitters))

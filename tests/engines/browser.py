@@ -1,7 +1,7 @@
 """Starts headless Chromium with a software renderer, and serves static files on the loopback address.
 
-Tests use both to read back what a browser draws. If a tool is missing, the test is not skipped: it fails
-with a sentence that says what to install.
+Tests read back the pixels that the browser draws. If a program or library is missing, a test is not skipped:
+it fails with a sentence that says what to install.
 """
 
 from __future__ import annotations
@@ -110,8 +110,8 @@ def chromium(width: int = 640, height: int = 480) -> Iterator[Any]:
             browser.close()
 
 
-# Console messages that are not errors: reading pixels back is slow, and a fetch that has all bytes may close
-# its stream early.
+# Messages that are ignored. The first warns that reading pixels back is slow. The second reports a fetch
+# whose stream was closed early, after all bytes had arrived.
 _HARMLESS = ("GPU stall due to ReadPixels", "net::ERR_ABORTED")
 
 

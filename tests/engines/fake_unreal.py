@@ -1,11 +1,11 @@
 """Stands in for assets and materials of Unreal Engine's Python module `unreal`, see `fake_unreal_editor`.
 
-Classes and editor properties follow the Python API reference (5.3 to 5.7); others raise an error. The pins of
-nodes are from the engine's sources (MaterialEditingLibrary.cpp, MaterialGraphNode.cpp). `shown` evaluates a
-material.
+Classes and editor properties follow the Python API reference (5.3 to 5.7). An unknown class or property
+raises an error. The pins of nodes are from the engine's sources (MaterialEditingLibrary.cpp,
+MaterialGraphNode.cpp). `shown` evaluates a material.
 """
 
-# The stand-ins are not changed; each object copies its `properties`.
+# Mutable class attributes are allowed here, because each object copies `properties`.
 # ruff: noqa: RUF012
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class DialogError(Exception):
 
 
 class Object:
-    """An object with editor properties; others than those in `properties` raise an error."""
+    """An object with editor properties. A property that `properties` does not list raises an error."""
 
     properties: dict = {}
 
@@ -129,7 +129,7 @@ class StaticMaterial(Object):
 
 class StaticMesh(Object):
     properties = {"static_materials": ()}
-    # Vertices in the mesh's space, cm, and whether UV channel 1 is that of the file.
+    # Vertices in the mesh's space, cm; is UV channel 1 that of the file? do UVs have full precision?
     position, uv_1_of_file, precise = None, True, False
 
     def set_material(self, material_index, new_material):
@@ -233,7 +233,7 @@ def _channel(colour, name):
 
 
 def shown(instance, uv):
-    """Return emissive colour and opacity or opacity mask of a material instance at UVs by channel."""
+    """Return emissive colour and {other input: value} of a material instance, for the UVs of its channels."""
     parent = instance.parent
     assert parent.compiled
     scene = {"uv": uv, "parameters": instance.parameters}

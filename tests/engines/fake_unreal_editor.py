@@ -1,8 +1,8 @@
-"""Stands in for the editor of Unreal Engine, as far as the script of the export uses it.
+"""Stands in for those parts of Unreal Engine's editor that the script of the export uses.
 
-Functions and arguments follow the Python API reference (5.3 to 5.7); others raise an error. Axes, slots and
-defaults of imported glTF files are from the engine's sources (GLTFCore, InterchangeGltfTranslator.cpp). Where
-the editor would open a dialog, a `DialogError` is raised.
+Functions and arguments follow the Python API reference (5.3 to 5.7). An unknown function or argument raises
+an error. Axes, slots and defaults of imported glTF files are from the engine's sources (GLTFCore,
+InterchangeGltfTranslator.cpp). Where the editor would open a dialog, a `DialogError` is raised.
 """
 
 # ruff: noqa: RUF012
@@ -350,7 +350,7 @@ class MaterialEditingLibrary:
 
 
 def _set(instance, name, value, kind):
-    """Set a parameter, which must be one of the parent's. As in the engine, the answer is always False."""
+    """Set a parameter of the parent material. As in the engine, the return value is always False."""
     assert isinstance(instance, MaterialInstanceConstant), "parameters can be set in instances only"
     assert isinstance(value, kind)
     calls = [

@@ -70,8 +70,9 @@ def play(browser, work, tasks, settings=""):
 def _add_export(game, folder, name):
     """Add the files of an export to the game.
 
-    The import script extends a class that only the editor has, and this build of Godot cannot read EXR files:
-    it has one thread, and its EXR reader starts threads.
+    The import script extends a class that only the editor has, so the class is replaced. This build of Godot
+    has one thread and cannot read EXR files, because its EXR reader starts threads. Therefore the pixels of
+    EXR files are also added as half floats.
     """
     for path in (p for p in folder.rglob("*") if p.is_file()):
         data, file = path.read_bytes(), f"{name}/{path.relative_to(folder).as_posix()}"

@@ -1,4 +1,4 @@
-"""Tools that change a GLB after a bake keep the lightmap uv with the flags of docs/AFTER.md, else lose it.
+"""Tools that change a GLB after a bake keep the lightmap uv with the flags of docs/AFTER.md only.
 
 The test runs by hand because the tools are large:
 
@@ -36,7 +36,7 @@ GRID = 12
 
 
 class Found(NamedTuple):
-    """What a tool left of a scene."""
+    """What a tool kept: the largest uv error in texels, and whether node indices and extras are unchanged."""
 
     texels: float
     nodes: bool
@@ -169,7 +169,7 @@ PACK = "gltfpack -i IN -o OUT -kn -km -ke"
 
 
 def after(tmp_path, scene, command):
-    """Run a command of which IN and OUT are the files, and return what it left."""
+    """Run a command with IN and OUT replaced by file paths, and return what the tool kept."""
     out = tmp_path / "changed.glb"
     run(*(str({"IN": scene, "OUT": out}.get(word, word)) for word in command.split()))
     return compare(scene, out)
@@ -224,7 +224,7 @@ def test_other_flags_lose(tmp_path, scene, command, lost):
 
 
 def test_gltfpack_drops_the_uv_of_a_bake_without_ao_unless_told(tmp_path, without_ao):
-    """Without AO no texture reads the lightmap uv."""
+    """Without AO, no texture reads the lightmap uv, so gltfpack drops the uv."""
     assert after(tmp_path, without_ao, f"{PACK} -c -noq").texels > 0.5
 
 

@@ -39,7 +39,7 @@ EXPOSURES = [2.0 ** (k / 4) for k in range(-8, 17)]
 
 
 def imported(project, environment):
-    """Run the editor until all files are imported; with --quit it may exit before it begins to import."""
+    """Run the editor until all files are imported. With --quit, it could exit before it begins to import."""
     editor = [need_program("godot3-server", "godot3-server"), "--editor", "--path", str(project)]
     wanted = len(list(project.glob("godot/*.exr"))) + 1
     log = project.with_suffix(".log")
@@ -81,7 +81,7 @@ def draw(folder, tmp_path, camera="front", exposures=EXPOSURES):
     assert "SCRIPT ERROR" not in told, told[-3000:]
     code = np.array(json.loads(result.read_text("utf-8")), float).reshape(-1, 64, 64, 3)
     exposure = json.loads((folder / "lightmap.json").read_text("utf-8"))["exposure"]
-    # Godot 3 truncates.
+    # Godot 3 truncates colours to 8 bits, so the offset is 0.5.
     return light_in_codes(code, exposures, 120, 0.5) / exposure
 
 

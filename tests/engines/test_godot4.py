@@ -199,7 +199,7 @@ def test_a_baked_light_lights_no_baked_object(drawn, way):
 
 
 def test_a_baked_light_lights_other_objects_at_the_scale_of_the_pages(drawn):
-    """The square lies 1 m below the light. The tolerance covers its highlight."""
+    """The light is 1 m in front of the square. The tolerance covers the specular highlight."""
     assert middles(drawn[0]["dynamic"]) == pytest.approx(lit_expected(), rel=0.1)
 
 
@@ -219,7 +219,7 @@ def test_double_sided_materials_stay(drawn, way):
 
 @WAYS
 def test_emission_has_the_scale_of_the_pages(drawn, way):
-    """The tolerance covers that the Compatibility renderer decodes colours with a polynomial."""
+    """The Compatibility renderer decodes colours with a polynomial. The tolerance covers its error."""
     expected = np.tile(BRIGHT * np.array([1.0, 0.5, 0.25]), (4, 1))
     assert middles(drawn[0][f"emission, {way}"]) == pytest.approx(expected, rel=0.03)
 

@@ -10,8 +10,8 @@ from engine_scenes import ALBEDO, probe_expected
 from proof import draw, middles, shows_something_else, shows_the_probe
 
 pytestmark = pytest.mark.engines
-# A standard material shows up to 2 % less than albedo x E / pi, because it also reflects specularly. The PNG
-# has 255 levels, of which the darkest quadrant is 32.
+# A standard material shows up to 2 % less than albedo x E / pi, because it also reflects specularly. In the
+# PNG, the darkest quadrant has level 32 of 255, so rounding adds an error of up to 0.5 / 32.
 REL = 0.02 + 0.5 / 32
 
 
@@ -23,7 +23,7 @@ def standard(browser, probe):
 
 @pytest.mark.parametrize(("loader", "rel"), [("hubs", 0.005), ("addon", 0.5 / 32)])
 def test_the_probe_is_shown(browser, probe, standard, loader, rel):
-    """The PNG has 8 bits for the whole range. three.js reads Radiance numbers 1/255 too large."""
+    """`hubs` reads the Radiance image, whose values three.js decodes 1/255 too large; `addon` the PNG."""
     picture = draw(browser, probe / "gltf", camera="front", moz=loader)
     assert middles(picture) == pytest.approx(standard, rel=rel)
     assert shows_the_probe(picture, rel=REL), middles(picture)

@@ -60,7 +60,7 @@ def test_scripts_do_not_use_unitys_editor_at_run_time(built, package):
 
 
 def test_a_second_level_compiles(probe, package, built, tmp_path):
-    """All scripts are in a folder that Unity ignores within Assets; without it, two levels do not compile."""
+    """Unity ignores folders whose names end with ~. In other folders, the scripts of two levels clash."""
     scripts = [p for p in (probe / "unity").rglob("*") if p.suffix in (".cs", ".asmdef")]
     assert scripts
     assert {p.relative_to(probe / "unity").parts[0][-1] for p in scripts} == {"~"}
@@ -139,7 +139,7 @@ def test_objects_that_are_not_found_are_named(built, probe, tmp_path):
 
 
 def test_import_settings(built, probe, tmp_path):
-    """Pages are imported once, with settings for BC6H. Later changes by the user stay, but the size grows."""
+    """The first import sets the format BC6H. Later, it keeps the user's settings, except a size too small."""
     *settings, direction = use(built, probe, tmp_path)["settings"][0]
     assert settings == [
         f"Lightmap Uncompressed False Clamp None {SIZE} 2",
@@ -168,7 +168,7 @@ def looked_up(probe, objects, uv):
 
 
 def test_probe_is_right_and_wrong_exports_are_seen(probe):
-    """White surfaces have the radiance E / pi in the right quadrants; E, or a v downwards, does not."""
+    """White surfaces have the radiance E / pi in the correct quadrants; v downwards gives other values."""
     objects = json.loads((probe / "unity" / "lightmap.json").read_text("utf-8"))["objects"]
     uv, expected = np.array(MIDDLE), QUADRANT.ravel()
     assert looked_up(probe, objects, uv) == pytest.approx(expected, rel=1e-3)

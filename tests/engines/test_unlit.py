@@ -26,7 +26,7 @@ def test_the_probe_is_shown(browser, probe):
     # For bright values half a step is less than 1 %.
     bright = probe_expected() > 0.3
     assert picture[bright] / exposure == pytest.approx(probe_expected()[bright], rel=0.01)
-    # The exposure maps the red of the brightest quadrant to white.
+    # The exposure maps the red channel of the brightest quadrant to 1.
     assert exposure == pytest.approx(1.0 / probe_expected().max(), rel=1e-3)
 
 

@@ -34,7 +34,7 @@ def slots(editor, name=NAME):
 
 
 def picture(editor):
-    """Return the (4, 3) colours of the probe at the points `MIDDLE`; all points have one TEXCOORD_0."""
+    """Return the (4, 3) colours of the probe at the points `MIDDLE`. TEXCOORD_0 is the same at all points."""
     (instance,) = slots(editor)
     return np.array([shown(instance, [(0.3, 0.3), (u, v)])[0] for v, u in MIDDLE])
 
@@ -268,14 +268,14 @@ def test_colours_alpha_and_emission(level):
     colour, alpha = shown(leaves, at)
     assert colour == pytest.approx([0.5029] * 3, rel=1e-3)
     assert alpha["MP_OPACITY_MASK"] == pytest.approx([1.0 - 0.75 + 0.5])
-    # At (0.5, 1.75), mirrored in v, it has the green texel, whose alpha is below the cutoff.
+    # At (0.5, 1.75), v is mirrored. The lookup returns the green texel, whose alpha is below the cutoff.
     colour, alpha = shown(leaves, [(0.25, 1.25), (0.5, 0.5)])
     assert colour == pytest.approx([0.0, 1.0, 0.0], rel=1e-3, abs=1e-9)
     assert alpha["MP_OPACITY_MASK"] == pytest.approx([64 / 255 - 0.75 + 0.5])
     colour, alpha = shown(glass, [(0.75, 0.25), (0.5, 0.5)])
     assert colour == pytest.approx([0.0, 1.0, 0.0], rel=1e-3, abs=1e-9)
     assert alpha["MP_OPACITY"] == pytest.approx([0.5 * 64 / 255])
-    # The red texel of the emission, 100 times.
+    # The emission is 100 times the red texel; the base colour of 1 is added.
     assert shown(screen, at)[0] == pytest.approx([1.0 + 100.0, 1.0, 1.0], rel=1e-3)
 
 

@@ -1,4 +1,4 @@
-"""Describes the differences between two records of the guard, one line for each."""
+"""Describes the differences between two records of the guard (see `outputs.py`), one line for each."""
 
 from __future__ import annotations
 

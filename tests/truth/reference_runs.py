@@ -1,6 +1,6 @@
 """Runs the reference path tracer on scenes with closed forms, and compares its results and standard errors.
 
-Each point is traced as many copies with independent random numbers. The standard deviation over the copies
+Each point is traced as several copies with independent random numbers. The standard deviation over the copies
 must match the standard errors that the reference reports.
 """
 
@@ -61,7 +61,7 @@ def traced(
 ) -> PointEstimate:
     """Return path-traced irradiance at `where`.
 
-    `where` is (position, normal), or a function that returns both for a pass number.
+    `where` is (position, normal), or a function that takes a pass number and returns (position, normal).
     """
     with build_reference(scene, sky=sky, lambertian=True, threads=threads) as reference:
         options = PassOptions(**{"seed": SEED, **how})

@@ -1,4 +1,4 @@
-"""MASK surfaces pass light at the uv of their holes, and BLEND surfaces pass the share 1 - alpha."""
+"""MASK surfaces pass light where alpha is below the cutoff; white BLEND surfaces pass the share 1 - alpha."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ def alpha_material(
 
 
 def floor_under(*cards, half=1.0, texels=40, light="directional", **where):
-    """Return a builder and its black floor of 2 x 2 m, below square cards at vertical intervals of 0.1 m.
+    """Return a builder and its black floor of side 2 x `half`, below square cards 0.1 m above each other.
 
-    cards : functions that add a material to the builder and return its index
+    cards : a function for each card that adds the card's material to the builder and returns its index
     """
     builder = SceneBuilder(96)
     floor = builder.quad(
@@ -172,7 +172,7 @@ def test_ambient_occlusion_through_blend(alpha):
 
 
 def test_sky_through_blend_and_its_own_reflection():
-    """Under a uniform sky, a room of coloured glass has transmitted light and reflections of this light.
+    """A room of coloured glass is lit by transmitted sky light and by the reflections of this light.
 
     From each point inside, only glass is visible. Therefore E = T * pi * L + alpha * albedo * E with
     T = (1 - alpha) * (1 - alpha * (1 - albedo)).
@@ -205,7 +205,7 @@ def test_what_is_not_there_does_not_shine(mode):
 
 
 def test_reciprocity_of_a_leaf_with_holes():
-    """Beside a lit wall, a white card with holes lights the floor like a card of the same shape.
+    """A card whose texture hides one half of it lights the floor like a card of half the size.
 
     The holes of the first card are texels with alpha 0. The second card has triangles for the opaque part
     only.

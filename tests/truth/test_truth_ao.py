@@ -27,7 +27,7 @@ def ao_rows(builder, floor, seed, **settings):
 
 
 def test_closed_forms_agree_with_quadrature():
-    """The closed forms agree with sums over the unit disc, to which directions are projected."""
+    """The closed forms agree with sums over the unit disc of projected directions."""
     x, y = np.meshgrid(*[(np.arange(1500) + 0.5) / 750 - 1] * 2)
     inside = x * x + y * y < 1
     x, z = x[inside], np.sqrt(1 - x[inside] ** 2 - y[inside] ** 2)
@@ -69,7 +69,7 @@ def test_floor_beside_a_long_wall_within_a_distance(reach):
 
 
 def test_limited_ao_from_gather_rays_is_the_same_as_alone():
-    """If light is also baked, AO is computed from the gather rays, with the same result."""
+    """If irradiance is also baked, AO is computed from the gather rays and equals the closed form, too."""
     builder, floor = wall_and_floor(10.0)
     truth = floor.texel_mean(lambda p: limited_wall_ao(p[..., 0], 1.5), 8)[:, 0]
     found = []

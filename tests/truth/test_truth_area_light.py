@@ -1,4 +1,4 @@
-"""The light of far, near, many and textured emitters is compared with Lambert's polygon formula."""
+"""The irradiance of far, near, many and textured emitters equals Lambert's polygon formula."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_parallel_square_at_every_texel(denoise):
 
 @pytest.mark.parametrize("height", [0.01, 0.03, 0.1, 0.3, 1.0, 2.0])
 def test_close_up_there_is_neither_bias_nor_a_spark(height):
-    """Close to an emitter, E is pi L opposite the emitter's middle, and the polygon formula at its rim."""
+    """From 1 cm to 2 m below an emitter, E equals the polygon formula, and no texel exceeds 1.25 pi L."""
     found, worst = [], 0.0
     for seed in range(SEEDS):
         builder = SceneBuilder(64)

@@ -91,8 +91,8 @@ def mirrored_light():
 
 
 def test_a_light_behind_a_mirror_lights_as_its_image_does():
-    # Only paths from the light find the way from a point light over a mirror to the floor. Paths from the eye
-    # cannot, because they never hit a point.
+    # Only paths that start at the light carry light from the mirror to the floor. A path that starts at the
+    # eye never hits a point light.
     scene, camera = mirrored_light()
     mean, error, _ = picture(scene, camera, "bdpt", 180, size=4, samples=1024)
     # Closed form: radiance of the floor from the light and its mirror image, averaged over each pixel.

@@ -99,13 +99,12 @@ def test_the_reference_finds_a_lit_texel():
             truth = irradiance(points, panel)
             error = mean[..., panel].std(axis=1) / math.sqrt(32)
             assert (np.abs(mean[..., panel].mean(axis=1) - truth) < critical(27) * error + 1e-3 * truth).all()
-            # If a hit of a spot by chance counted fully, the estimate would be about a hundred times the
-            # truth.
+            # If chance hits of a spot had the weight 1, an estimate would be about a hundred times the truth.
             assert mean[..., panel].max() < 2.0 * truth.max()
 
 
 def test_estimators_agree_on_a_screen():
-    """A screen in a room has a coarse emissive texture with holes. Random rays can hit its lit texels."""
+    """In this room, a screen has an emissive texture of 3 x 4 texels, so that random rays hit lit texels."""
     image = np.zeros((3, 4, 4), np.float32)
     image[1, 2], image[0, 1], image[2, 0] = (9, 2, 4, 1), (3, 8, 3, 1), (5, 5, 5, 0)
     base = np.ones((3, 4, 4), np.float32)

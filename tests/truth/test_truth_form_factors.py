@@ -84,9 +84,10 @@ def test_inside_a_sphere_every_pair_depends_on_the_target_only():
     area = np.bincount(group, patches.area)
     found = between(group, patches, matrix)
     ratio = found / (area / area.sum())
-    # A group casts 16 x 6 x 512 rays, of which 1/20 hit each other group. These 2400 hits in both directions
-    # give a pair of groups a noise of 1.4 %. The 320 flat faces differ from the sphere by up to 2 %. The form
-    # factor of a group to itself is 15/16 of that on a sphere, because a flat face does not see itself.
+    # A group casts 16 x 6 x 512 rays, and 1/20 of the rays hit each other group. About 2400 hits in each
+    # direction give a pair of groups a noise of 1.4 %. The 320 flat faces differ from the sphere by up to
+    # 2 %. The form factor of a group to itself is 15/16 of that on a sphere, because a flat face does not see
+    # itself.
     apart = ratio[~np.eye(20, dtype=bool)]
     assert np.abs(apart - 1).max() < 0.04
     assert apart.std() < 0.015

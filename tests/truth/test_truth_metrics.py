@@ -118,7 +118,7 @@ def test_form_factor_of_unit_squares(perpendicular, estimator):
 
 
 def polyhedron(corner, light=(), albedo=0.5, emission=None):
-    """Return a scene of triangles (t, 3, 3), and their normals; `emission` (t,) bool: those that emit."""
+    """Return a scene of triangles (t, 3, 3), and their normals; `emission` (t,) bool marks emitters."""
     n = len(corner)
     face = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     face /= np.linalg.norm(face, axis=1, keepdims=True)

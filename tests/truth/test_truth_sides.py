@@ -86,7 +86,7 @@ def test_double_sided_sheet_in_a_furnace_changes_nothing():
 
 
 def test_one_sided_sheet_swallows_light_at_its_back():
-    """A one-sided sheet in the same furnace darkens the walls behind its back, which absorbs their light."""
+    """A one-sided sheet in the same furnace absorbs light at its back, so the wall behind it is darker."""
     builder = SceneBuilder(64)
     walls = builder.material(0.7, 1.0)
     quads = builder.box((0, 0, 0), (2, 2, 2), walls, 10, inward=True)

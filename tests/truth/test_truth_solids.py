@@ -11,7 +11,7 @@ SUNK, EXACT = -0.3, 0.0
 
 
 def crate_in_slab(double_sided, low, *, inward=False, albedo=0.5, half=4.0):
-    """Bake a crate of 1 m in or on a slab under a sky of radiance 1, and return slab, crate and result."""
+    """Bake a crate 1 m wide in or on a slab under a sky of radiance 1; return slab, crate and result."""
     builder = SceneBuilder(128)
     material = builder.material(albedo, double_sided=double_sided)
     slab = builder.box((-half, -0.5, -half), (half, 0, half), material, 26)

@@ -145,7 +145,7 @@ def test_transparent_black_beside_stained_glass():
 
 
 def room_with_a_pane(colour=COLOUR, albedo=0.7):
-    """Return a closed room with 8 x 8 texels on each wall, divided by a pane at a border between texels."""
+    """Return a closed room with 8 x 8 texels on each wall. A pane divides the room at a texel border."""
     builder = SceneBuilder(64)
     builder.box((-1, -1, -1), (1, 1, 1), builder.material(albedo), 8, inward=True)
     builder.quad((-1, 0, -1), (0, 0, 2), (2, 0, 0), glass(builder, colour), (8, 8))

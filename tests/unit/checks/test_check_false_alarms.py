@@ -18,7 +18,7 @@ def codes(tmp_path, data, **settings) -> set[str]:
 
 
 def arch(without=()):
-    """Return an arch of n segments whose two feet stand on y = 0 without bottom faces."""
+    """Return an arch of 24 segments; its feet stand on y = 0 and are open. `without` lists omitted faces."""
     ring = np.linspace(0, np.pi, 25)
     inner = np.stack([np.cos(ring), np.sin(ring)], axis=1)
     section = [(1.0, 0.0), (1.2, 0.0), (1.2, 0.2), (1.0, 0.2)]

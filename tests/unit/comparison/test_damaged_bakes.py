@@ -1,7 +1,7 @@
 """`diff` refuses damaged manifests before numbers from them reach a kernel.
 
-The page number of an instance was once used unchecked: `texel_owners` writes at an index that is computed
-from it. With a number slightly too large, it wrote beyond the map of texels, and the process crashed later,
+The page number of an instance was once used unchecked. `texel_owners` computes an index from this number and
+writes there. A page number slightly too large made it write beyond its array, and the process crashed later,
 while it compared another folder.
 """
 

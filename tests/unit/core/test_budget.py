@@ -1,4 +1,4 @@
-"""The check `cost` and the memory limit use one estimate, which is within 30 % of the measured values."""
+"""The check `cost` and the memory limit use one estimate of peak memory, within 30 % of measured peaks."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_the_estimate_is_within_30_percent_of_the_measured_peak(name, values):
     assert cost.bytes == pytest.approx(estimate, rel=0.01)
     assert cost.pages == measured["pages"]
     assert 0.3 < measured["texels"] / cost.texels < 1.1
-    # The few rays that detect texels with two sides and narrow gaps are not estimated.
+    # The rays that detect split texels and narrow gaps are few and are not estimated.
     assert set(cost.rays) == set(measured["rays"]) - {"texel sides", "narrow gaps"}
 
 
@@ -126,7 +126,7 @@ def test_the_estimate_covers_the_decoding_of_a_large_image():
     half = LARGEST_IMAGE_SIDE // 2
     assert image_bytes(scene()) == (0, 0)
     assert image_bytes(scene(64, half)) == (4 * (64**2 + half**2), 4 * (64**2 + 2 * half**2))
-    # An image of this size may have been reduced from one of twice its width and height.
+    # An image of this size may be the reduced version of an image of twice its width and height.
     assert image_bytes(scene(half + 1)) == (4 * (half + 1) ** 2, 5 * 4 * (half + 1) ** 2)
     twice = replace(scene(64), materials=scene(64).materials * 2)
     assert image_bytes(twice)[0] == 4 * 64**2

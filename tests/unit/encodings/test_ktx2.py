@@ -102,7 +102,7 @@ def test_the_error_is_uniform_within_half_a_step(dark):
     pixels = (pixels * step[:, None]).astype(np.float32)
     miss = (KTX2.stored(pixels, OPTIONS) - pixels.astype(np.float64))[0] / step[:, None]
     assert np.abs(miss).max() <= 0.5
-    # Mean and mean square have the deviations 0.0014 and 0.0004; the limits are 5 deviations.
+    # Mean and mean square have the standard deviations 0.0014 and 0.0004; the limits are 5 of them.
     assert np.abs(miss.mean(axis=0)).max() < 0.0072
     assert np.abs((miss**2).mean(axis=0) - 1.0 / 12.0).max() < 0.002
 

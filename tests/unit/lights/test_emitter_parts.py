@@ -154,7 +154,7 @@ def test_a_dim_emitter_is_cut_as_finely_beside_a_bright_one():
 
 
 def test_more_lit_texels_than_parts_keep_their_power():
-    """200 repeats of a texture with one lit texel of 64 x 64 exceed the limit. Parts have mean radiance."""
+    """200 x 200 lit texels exceed the limit of 2000 parts, so each part has the mean radiance of its area."""
     image = one_texel()
     world = plate(emissive(image, (8.0,) * 3))
     shading = world.shading._replace(emission_uv=world.shading.emission_uv * np.float32(200))

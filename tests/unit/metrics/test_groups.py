@@ -43,8 +43,8 @@ def test_the_error_of_the_bias_is_its_spread():
         found.append(compare_group(points(1.02 * truth, reference), 1.0))
     assert np.mean([f.bias for f in found]) == pytest.approx(0.02, abs=0.002)
     assert np.std([f.bias for f in found]) == pytest.approx(np.mean([f.bias_se for f in found]), rel=0.15)
-    # `sure_bias` is the bias reduced by 3.6 standard errors. It does not exceed the true bias, and is 0
-    # without a bias.
+    # `sure_bias` is the bias reduced by 3.6 standard errors. In these samples it never exceeds the true bias.
+    # Without a bias, at most 3 of 400 samples have a `sure_bias` other than 0.
     assert sum(f.sure_bias > 0.02 for f in found) == 0
     exact = [compare_group(points(t, r), 1.0) for t, r in (noisy(rng, 50) for _ in range(400))]
     assert sum(f.sure_bias != 0 for f in exact) < 4
@@ -69,7 +69,7 @@ def test_one_bright_place_decides_nothing():
     found = compare_group(points(value, truth), 1.0)
     assert found.bias == pytest.approx(-0.19, abs=0.01)
     assert found.sure_bias == 0
-    # Two bright points with the same deviation have no variance, but are not significant either.
+    # Two bright points with the same deviation have no variance. Their bias is not significant either.
     dark = np.full((30, 3), 1e-6)
     dark[:2] = 1.0
     two = compare_group(points(0.75 * dark, dark), 1.0)

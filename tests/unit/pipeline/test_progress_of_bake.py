@@ -16,7 +16,7 @@ from baker.pipeline.precompile import labelled
 
 
 class Running:
-    """A process that has not ended until `code` is set."""
+    """A process that runs until `code` is set."""
 
     code: int | None = None
 

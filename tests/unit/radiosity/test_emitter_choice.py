@@ -1,4 +1,4 @@
-"""`EmitterChooser` chooses the clusters of emitters that a tile of texels samples, and probabilities."""
+"""`EmitterChooser` chooses the emitter clusters that a tile of texels samples, and their probabilities."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ def test_an_invalid_reference_does_not_become_valid_in_a_bake(name, tmp_path):
     add, path = CASES[name]
     builder = quad_builder()
     builder.image(b"\x89PNG", sampler=0)
-    # Something that must stay as it is.
+    # The bake must not change this skin.
     builder.add("skins", {"joints": [0], "inverseBindMatrices": builder.accessor(QUAD[:1])})
     add(builder)
     index = {key: len(items) - 1 for key, items in builder.json.items() if isinstance(items, list)}
