@@ -180,7 +180,7 @@ class _Tile:
 
 
 class BareRays:
-    """Rays of one kind, which can be traced repeatedly. They start at texels of every k-th tile of the scene.
+    """Rays of one kind, which can be traced repeatedly. They start at the texels of every k-th tile.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Prints how the time of load, check, unwrap and bake grows with the number of objects, of each of `KINDS`.
+"""Prints how the time of load, check, unwrap and bake grows with the number of objects, by kind of scene.
 
     python benchmarks/scene_size.py [KIND...] [--counts 500,2000,8000]
 

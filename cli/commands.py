@@ -12,5 +12,5 @@ COMMANDS = {
     "diff": "Compare two bakes at the same surface points.",
     "render": "Path-trace a scene through a camera.",
     "view": "Show a bake in a local web page.",
-    "inspect": "Print the contents of a scene, a bake or an EXR.",
+    "inspect": "Print the contents of a scene, a bake or a lightmap image.",
 }

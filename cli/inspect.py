@@ -1,4 +1,4 @@
-"""`baker inspect PATH`: prints the contents of a scene, a bake or an image."""
+"""`baker inspect PATH`: prints the contents of a scene, a bake or a lightmap image."""
 
 from __future__ import annotations
 
@@ -24,7 +24,9 @@ def inspect(
     ctx: typer.Context,
     path: Annotated[
         Path,
-        typer.Argument(metavar="PATH", help="Scene file, output folder, bake.json, image or status_0.png."),
+        typer.Argument(
+            metavar="PATH", help="Scene file, output folder, bake.json, lightmap image or status_0.png."
+        ),
     ],
 ) -> None:
     """Print the contents of `path`."""

@@ -22,8 +22,9 @@ from baker.verification.settings import VerifySettings
 HEAD = """\
 # Settings
 
-Every setting of every command is a flag, a key of the file given with `--config`, and a keyword of the
-function of the Python API. A flag overrides the file, and the file overrides the default.
+Every setting is a flag of the command line and a keyword of the Python API. Except for the settings of
+`baker batch`, it is also a key of the file given with `--config`. A flag overrides the file, and the file
+overrides the default.
 `docs/make_settings_page.py` generates this page from the code.
 """
 
@@ -49,7 +50,7 @@ SECTIONS: list[tuple[type[Settings], str, str]] = [
     (
         BatchSettings,
         "batch",
-        "Settings of `baker batch` and `baker.batch`. The configuration file has no keys for them.",
+        "Settings of `baker batch` and `baker.batch`. They cannot be set in a configuration file.",
     ),
     (RenderSettings, "render", "Settings of `baker render` and `baker.render`."),
 ]

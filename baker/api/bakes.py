@@ -68,13 +68,13 @@ def bake(
         samples : int | None, 1 to 65536, default None
             Hemisphere rays per texel; default: by `quality`.
         light_samples : int | None, 1 to 65536, default None
-            Shadow rays per texel; default: `samples`.
+            Rays per texel to emissive surfaces; default: `samples`.
         ao_samples : int | None, 1 to 65536, default None
             AO rays per texel; default: `samples`.
         ao_distance : str | float, m, default '10%'
             Maximum distance of AO: metres, `10%` of the scene's diagonal, or `inf`.
         sky : str | float | Sequence[float] | None, cd/m2, default None
-            Sky radiance R,G,B in cd/m2.
+            Sky radiance R,G,B in cd/m2. Default: black.
         sky_strength : float, from 0, default 1.0
             Factor of the sky radiance.
         bounces : int | None, 0 to 1000, default None

@@ -40,7 +40,7 @@ class BakeKeywords(TypedDict, total=False):
     # Hemisphere rays per texel; default: by `quality`.
     samples: int | None
 
-    # Shadow rays per texel; default: `samples`.
+    # Rays per texel to emissive surfaces; default: `samples`.
     light_samples: int | None
 
     # AO rays per texel; default: `samples`.
@@ -49,7 +49,7 @@ class BakeKeywords(TypedDict, total=False):
     # Maximum distance of AO: metres, `10%` of the scene's diagonal, or `inf`.
     ao_distance: str | float
 
-    # Sky radiance R,G,B in cd/m2.
+    # Sky radiance R,G,B in cd/m2. Default: black.
     sky: str | float | Sequence[float] | None
 
     # Factor of the sky radiance.
@@ -135,10 +135,10 @@ class AoKeywords(TypedDict, total=False):
 class BatchKeywords(TypedDict, total=False):
     """Keywords of `BatchSettings`."""
 
-    # Number of bakes that run at the same time, each in its own process.
+    # Number of bakes that run at the same time, each in a separate process.
     jobs: int
 
-    # Memory limit of all running bakes together, such as 8G.
+    # Limit of the estimated memory of all running bakes together, such as 8G.
     memory: str | float | None
 
     # Only report the jobs that would be baked, with reasons.
@@ -150,7 +150,7 @@ class BatchKeywords(TypedDict, total=False):
     # Bake all jobs, also into folders that baker did not write.
     force: bool
 
-    # Seed of all bakes; by default, each job has its own setting.
+    # Seed of all bakes; by default, each job uses the seed in its settings.
     seed: int | None
 
     # Number of threads; default: all cores.

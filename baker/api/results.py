@@ -340,9 +340,9 @@ def batch(
         Settings by name, which replace those in `settings`:
 
         jobs : int, 1 to 1024, default 1
-            Number of bakes that run at the same time, each in its own process.
+            Number of bakes that run at the same time, each in a separate process.
         memory : str | float | None, bytes, default None
-            Memory limit of all running bakes together, such as 8G.
+            Limit of the estimated memory of all running bakes together, such as 8G.
         dry_run : bool, default False
             Only report the jobs that would be baked, with reasons.
         fail_fast : bool, default False
@@ -350,7 +350,7 @@ def batch(
         force : bool, default False
             Bake all jobs, also into folders that baker did not write.
         seed : int | None, 0 to 2147483647, default None
-            Seed of all bakes; by default, each job has its own setting.
+            Seed of all bakes; by default, each job uses the seed in its settings.
         threads : int | None, 1 to 1024, default None
             Number of threads; default: all cores.
 

@@ -66,7 +66,7 @@ class CommonSettings(Settings):
         None, "Hemisphere rays per texel; default: by `quality`.", ge=1, le=65536, group=LIGHT
     )
     light_samples: int | None = setting(
-        None, "Shadow rays per texel; default: `samples`.", ge=1, le=65536, group=LIGHT
+        None, "Rays per texel to emissive surfaces; default: `samples`.", ge=1, le=65536, group=LIGHT
     )
     ao_samples: int | None = setting(
         None, "AO rays per texel; default: `samples`.", ge=1, le=65536, group=OCCLUSION
@@ -79,7 +79,7 @@ class CommonSettings(Settings):
         metavar="DISTANCE",
     )
     sky: Numbers | None = setting(
-        None, "Sky radiance R,G,B in cd/m2.", unit="cd/m2", group=BAKE, metavar="R,G,B"
+        None, "Sky radiance R,G,B in cd/m2. Default: black.", unit="cd/m2", group=BAKE, metavar="R,G,B"
     )
     sky_strength: float = setting(1.0, "Factor of the sky radiance.", ge=0, allow_inf_nan=False, group=LIGHT)
     bounces: int | None = setting(

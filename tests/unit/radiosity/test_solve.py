@@ -73,7 +73,7 @@ def test_the_answer_is_that_of_a_dense_solve(albedo, open_sky):
 
 
 def coloured(matrix, rng):
-    """Return the matrix with random transmittance between patches and to the sky, and its dense (3, n, n)."""
+    """Return the matrix with random transmittances to patches and sky, and its dense form (3, n, n)."""
     n = len(matrix.first) - 1
     shared = rng.random((n, n, 3))
     shared = (shared + shared.transpose(1, 0, 2)) / 2

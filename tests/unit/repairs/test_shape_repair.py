@@ -166,7 +166,7 @@ def test_open_surfaces_are_wound_alike(tmp_path):
 
 
 def vault(n: int = 300):
-    """Return a half cylinder of length and radius 1 that faces outwards, of 2 n slivers along its axis."""
+    """Return an outward-facing half cylinder of radius 1 and length 1. Its 2 n triangles are slivers."""
     angle = np.arange(n + 1) * np.pi / n
     arc = np.stack([np.cos(angle), np.sin(angle), np.zeros(n + 1)], axis=1)
     position = np.concatenate([arc, arc + np.array([0, 0, 1])]).astype(np.float32)

@@ -174,7 +174,7 @@ def test_the_answer_does_not_depend_on_the_packet():
 
 
 def test_a_shared_edge_is_decided_once():
-    """Rays through a pane's diagonal hit two triangles, but a share alpha stops, not 1 - (1 - alpha)^2."""
+    """A pane stops the share alpha of rays through its diagonal, although they hit two triangles."""
     n = 20000
     x = np.random.default_rng(5).integers(1, 2**16, n) / np.float64(2**16)
     origin = np.float32(np.column_stack([x, x, np.full(n, 5.0)]))

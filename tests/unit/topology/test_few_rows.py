@@ -15,7 +15,7 @@ from baker.topology import triangle_check, unique_rows, weld
 
 @pytest.fixture
 def large(monkeypatch):
-    """Return a function that calls another one with the code for large meshes."""
+    """Return a function that calls its first argument while `FEW` selects the code for large meshes."""
 
     def call(function, *arguments):
         with monkeypatch.context() as patch:

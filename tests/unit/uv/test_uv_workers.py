@@ -21,7 +21,7 @@ def jobs() -> list[ChartJob]:
 
 @pytest.fixture
 def lose(monkeypatch: pytest.MonkeyPatch):
-    """Return a function after whose call a signal kills the next `times` workers that get a job."""
+    """Return a function `lose(number, times)`: signal `number` kills the next `times` workers that start."""
 
     def lose(number: int, times: int) -> list[int]:
         ended: list[int] = []
