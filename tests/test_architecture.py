@@ -372,6 +372,11 @@ def test_checks_page_is_current():
     assert (ROOT / "docs" / "CHECKS.md").read_text("utf-8") == page
 
 
+def test_formats_page_is_current():
+    page = run(sys.executable, str(ROOT / "docs" / "make_formats_page.py"), "--print")
+    assert (ROOT / "docs" / "FORMATS.md").read_text("utf-8") == page
+
+
 def test_settings_page_is_current():
     page = run(sys.executable, str(ROOT / "docs" / "make_settings_page.py"), "--print")
     assert (ROOT / "docs" / "SETTINGS.md").read_text("utf-8") == page

@@ -15,45 +15,13 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from baker.core.errors import InputError
-from baker.core.scene import SceneWarning
 from baker.io.gltf.chunks import MAGIC, Chunks, split_glb
 from baker.io.gltf.json import JsonObject
 from baker.io.gltf.uri import UriError, is_data, read_uri
 from baker.io.scene_folder import OutsideError, OutsideName, SceneFolder
 
-UNDERSTOOD = frozenset(
-    {
-        "KHR_lights_punctual",
-        "KHR_materials_emissive_strength",
-        "KHR_materials_pbrSpecularGlossiness",
-        "KHR_materials_unlit",
-        "KHR_mesh_quantization",
-        "KHR_texture_transform",
-        "KHR_node_visibility",
-        "EXT_mesh_gpu_instancing",
-        "EXT_texture_webp",
-    }
-)
-# Extensions that are ignored without a warning: they change neither geometry nor base colour nor emission.
-IRRELEVANT = frozenset(
-    {
-        "KHR_animation_pointer",
-        "KHR_materials_anisotropy",
-        "KHR_materials_clearcoat",
-        "KHR_materials_dispersion",
-        "KHR_materials_ior",
-        "KHR_materials_iridescence",
-        "KHR_materials_sheen",
-        "KHR_materials_specular",
-        "KHR_materials_variants",
-        "KHR_xmp_json_ld",
-    }
-)
 # Top-level members that must be lists, because the writer of scene.glb may append to them.
 _LISTS = ("accessors", "bufferViews", "materials", "meshes", "nodes", "images", "samplers", "textures")
-# Ignored extensions that `_check_extensions` does not report, because `material.py` reports them for each
-# material.
-_REPORTED = frozenset({"KHR_materials_transmission"})
 # Largest depth of nested JSON objects and lists in a top-level member.
 _DEEPEST = 100
 _COMPRESSED_VIEW = ("EXT_meshopt_compression", "KHR_meshopt_compression")
@@ -79,7 +47,6 @@ class GltfDocument:
     sha256 : str
         SHA-256 of the scene file, followed by the external buffers (at most `byteLength` bytes of each) and
         the external images.
-    warnings : tuple of SceneWarning
     """
 
     root: JsonObject
@@ -90,7 +57,6 @@ class GltfDocument:
     chunks: tuple[tuple[int, bytes], ...]
     folder: SceneFolder
     sha256: str
-    warnings: tuple[SceneWarning, ...]
 
     def view(self, index: int) -> tuple[bytes, int, int, int]:
         """Return (buffer, byte offset, byte length, byte stride or 0) of a buffer view.
@@ -141,8 +107,8 @@ def open_document(path: Path, data: bytes, folder: SceneFolder | None = None) ->
     Raises
     ------
     InputError
-        For a broken container, malformed JSON, a version other than 2.x, an unknown required extension, or a
-        file outside of `folder`. Also if a top-level member that must be a list is none.
+        For a broken container, malformed JSON, a version other than 2.x, or a file outside of `folder`. Also
+        if a top-level member that must be a list is none.
     """
     file, folder = str(path), folder or SceneFolder(path.parent)
     chunks = split_glb(data, file) if data[:4] == MAGIC else Chunks(data, None, ())
@@ -150,7 +116,6 @@ def open_document(path: Path, data: bytes, folder: SceneFolder | None = None) ->
     _check_version(root)
     for key in _LISTS:
         root.children(key)
-    warnings = _check_extensions(root)
     digest = hashlib.sha256(data)
     buffers: list[bytes] = []
     buffer_faults: dict[int, InputError] = {}
@@ -179,7 +144,6 @@ def open_document(path: Path, data: bytes, folder: SceneFolder | None = None) ->
         chunks=chunks.others,
         folder=folder,
         sha256=digest.hexdigest(),
-        warnings=tuple(warnings),
     )
 
 
@@ -227,22 +191,6 @@ def _check_version(root: JsonObject) -> None:
         major, _, minor = version.partition(".")
         if major != "2" or (key == "minVersion" and minor not in ("", "0")):
             asset.fail(f"this is glTF {version}; only glTF 2.0 is read, so convert it first", key)
-
-
-def _check_extensions(root: JsonObject) -> list[SceneWarning]:
-    known = UNDERSTOOD | IRRELEVANT
-    for name in root.strings("extensionsRequired"):
-        if name not in known:
-            raise InputError(
-                f"the file requires the extension {name}, which is not understood; export without it",
-                file=root.file,
-                object=name,
-            )
-    return [
-        SceneWarning("extension-ignored", f"the extension {name} is not understood and was ignored", name)
-        for name in root.strings("extensionsUsed")
-        if name not in known | _REPORTED
-    ]
 
 
 def _read_buffer(

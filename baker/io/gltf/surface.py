@@ -11,32 +11,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from baker.core.scene import SceneWarning
-from baker.io.gltf.document import IRRELEVANT, UNDERSTOOD
+from baker.io.gltf.extension import EXTENSIONS
 from baker.io.gltf.json import JsonObject
 
 # Albedo of a material whose reflection model is unknown, 0 to 1.
 UNKNOWN_ALBEDO = 0.5
 _GLOSSY = "KHR_materials_pbrSpecularGlossiness"
-# Extensions that do not replace pbrMetallicRoughness. If a material has no base colour and only extensions of
-# this list, it is white, the default of glTF.
-_LAYERS = (
-    UNDERSTOOD
-    | IRRELEVANT
-    | {
-        "ADOBE_materials_clearcoat_specular",
-        "ADOBE_materials_clearcoat_tint",
-        "ADOBE_materials_thin_transparency",
-        "KHR_materials_diffuse_transmission",
-        "KHR_materials_subsurface",
-        "KHR_materials_transmission",
-        "KHR_materials_volume",
-        "KHR_materials_volume_scatter",
-        "MSFT_lod",
-        "MSFT_packing_normalRoughnessMetallic",
-        "MSFT_packing_occlusionRoughnessMetallic",
-        "VRMC_materials_hdr_emissiveMultiplier",
-    }
-)
 
 
 class PbrSurface(NamedTuple):
@@ -89,7 +69,7 @@ def read_surface(material: JsonObject, name: str, warnings: list[SceneWarning]) 
         )
     colour = _four(metallic_roughness.numbers("baseColorFactor", 4, (1.0, 1.0, 1.0, 1.0)))
     if "baseColorFactor" not in metallic_roughness and "baseColorTexture" not in metallic_roughness:
-        unknown = sorted(set(material.child_or_empty("extensions").value) - _LAYERS)
+        unknown = [name for name in sorted(material.child_or_empty("extensions").value) if _replaces(name)]
         if unknown:
             message = (
                 f"the material '{name}' has no base colour but {unknown[0]}, which is not understood; "
@@ -104,6 +84,12 @@ def read_surface(material: JsonObject, name: str, warnings: list[SceneWarning]) 
         metallic_roughness.number("metallicFactor", 1.0, low=0.0, high=1.0),
         metallic_roughness.number("roughnessFactor", 1.0, low=0.0, high=1.0),
     )
+
+
+def _replaces(name: str) -> bool:
+    """Return whether an extension may contain the base colour; if not, glTF's default white applies."""
+    extension = EXTENSIONS.get(name)
+    return extension is None or extension.replaces_colour
 
 
 def _four(value: tuple[float, ...]) -> tuple[float, float, float, float]:

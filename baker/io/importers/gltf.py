@@ -17,7 +17,8 @@ from baker.core.scene import Instance, Mesh, PunctualLight, Scene, SceneWarning,
 from baker.core.source_mesh import SourceInstance, SourceMesh, SourceScene
 from baker.io.gltf.camera import read_cameras
 from baker.io.gltf.document import GltfDocument, open_document
-from baker.io.gltf.instancing import refuse_broken, spread_instances
+from baker.io.gltf.extension import expand_document
+from baker.io.gltf.instancing import refuse_broken
 from baker.io.gltf.json import JsonObject
 from baker.io.gltf.light import read_light
 from baker.io.gltf.material import MaterialReader
@@ -72,12 +73,10 @@ def import_gltf(source: SceneFile) -> Scene:
     InputError
         If the file is malformed, requires an unknown extension, or holds nothing to bake.
     """
-    document = open_document(source.path, source.data, source.folder)
-    warnings = list(document.warnings)
+    document, warnings = expand_document(open_document(source.path, source.data, source.folder))
     if source.up != "y" or source.scale != 1.0:
         message = "up axis and scale are not applied: glTF is +Y up and in metres"
         warnings.append(SceneWarning("up-and-scale-ignored", message))
-    spread_instances(document)
     number, placed = _choose_scene(document, source.scene_index, warnings, lenient=source.lenient)
     reader = MaterialReader(document, reflections=source.reflections)
     meshes, instances, source_scene = _instances(document, placed, reader, warnings, lenient=source.lenient)

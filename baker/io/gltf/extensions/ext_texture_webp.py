@@ -1,0 +1,12 @@
+"""Describes EXT_texture_webp, which `baker.io.gltf.material` reads."""
+
+from __future__ import annotations
+
+from baker.io.gltf.extension import EXTENSIONS, GltfExtension
+
+EXTENSIONS.register("EXT_texture_webp")(
+    GltfExtension(
+        read="all",
+        used="textures",
+    )
+)
