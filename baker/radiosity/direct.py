@@ -4,7 +4,7 @@ Two estimates of the direct irradiance are computed:
 
 - `weighted` contains all light of lights without area, and the part of the emitters' light that MIS (multiple
   importance sampling) assigns to shadow rays. The final gather adds the remaining part, from its rays that
-  hit emitters. The lightmap contains the sum of both parts.
+  hit emitters.
 - `complete` is all direct light. Surfaces reflect it in the first bounce.
 """
 
@@ -39,8 +39,8 @@ TILE = 512
 WEIGHTED, COMPLETE = slice(0, 3), slice(3, 6)
 # Number of hemisphere rays per texel that `complete` combines with shadow rays, at texels close to emitters.
 N_HEMISPHERE = 4
-# Limit of radius / distance of a visible emitter cluster. Above this limit, texels are close to the cluster
-# and cast `N_HEMISPHERE` rays.
+# Limit of radius / distance of a visible emitter cluster. Above this limit, texels are close to the cluster.
+# They cast `N_HEMISPHERE` hemisphere rays, unless their light is computed in closed form.
 CLOSE = 0.5
 
 
@@ -60,8 +60,8 @@ class DirectLight:
         1 for entries whose `weighted` contains all light of the visible emitters, computed in closed form.
     rays : int
         Number of shadow rays and hemisphere rays cast for emitters, without the probe rays of
-        `radiosity.emitter_choice`, plus 16 for each pair of an entry and a light without area. The second
-        number is an upper bound, because points that the light does not illuminate cast no ray.
+        `radiosity.emitter_choice`, plus 16 for each pair of an entry and a light without area. The number for
+        lights without area is an upper bound, because points that the light does not illuminate cast no ray.
     """
 
     weighted: NDArray[np.float32]
@@ -253,7 +253,7 @@ class _EmitterLight:
 def batch_variance(total: NDArray[np.float32], squares: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return (m,) float32: the variance of (R + G + B) / 3 of m texels, from 16 batches of samples each.
 
-    A texel's R is the sum of the contributions of its batches; so are G and B.
+    R, G and B of a texel are sums over its batches.
 
     Parameters
     ----------

@@ -8,10 +8,11 @@ shadow rays, the probe rays, are cast from the tile to each cluster to find whet
 - Clusters that no probe ray reaches are called hidden. They form a separate stratum with few samples, which
   MIS combines with gather rays that hit these clusters. So a cluster that is visible only through a small
   opening still contributes.
-- In two cases, visible and hidden clusters are found for each block of up to sixteen consecutive texels. In
-  the first case, a cluster that is much brighter than another visible cluster (`_OUTSHINES`) is visible from
-  only a part of the tile. In the second case, the weights of two clusters differ by more than `_OUTSHINES`,
-  and the chart or the normal changes within the tile.
+- The weight of a cluster is power / distance^2. In two cases, visible and hidden clusters are found
+  separately for each block of up to sixteen consecutive texels. In the first case, a cluster is visible from
+  only a part of the tile and has more than `_OUTSHINES` times the weight of another visible cluster. In the
+  second case, the weights of any two clusters differ by more than this factor, and the chart or the normal
+  changes within the tile.
 
 Based on: Ward, Adaptive shadow testing for ray tracing, 1991; Georgiev et al., Importance caching for complex
 illumination, 2012.
@@ -41,7 +42,8 @@ from baker.kernels.shading import Shading
 from baker.radiosity.kernels.emitter_probe import probe_clusters
 from baker.trace.packets import PACKET_WIDTH, PacketBuffers
 
-# Largest and smallest number of probe rays from a tile to each cluster. From a block, they are at most 16.
+# Largest and smallest number of probe rays from a tile to each cluster. From a block, at most 16 rays are
+# cast to each cluster.
 _MOST_RAYS, _FEWEST_RAYS = 32, 4
 # Number of probe rays of a tile to all clusters, as a share of the tile's shadow rays.
 _COST = 0.06
@@ -52,9 +54,8 @@ _FEW = 32
 # weight. If there are more than _FEW clusters, the dimmest hidden clusters, up to this limit of their total
 # weight, are sampled together with the visible clusters.
 _HARMLESS = 0.25
-# Limit of the ratio of the weights of two clusters. Above this limit, clusters are chosen for each block if
-# the chart or the normal changes within the tile, or if both clusters are visible and the cluster of larger
-# weight is visible from only a part of the tile.
+# Limit of the ratio of the weights of two clusters. Above this limit, clusters may be chosen separately for
+# each block, see above.
 _OUTSHINES = 4.0
 # Smallest cosine between the normals of consecutive texels of a block. Below this cosine, a new block begins.
 _TURN = 0.5
@@ -271,7 +272,7 @@ class EmitterChooser:
     ) -> Choice:
         """Return the choice for one part of a tile.
 
-        origin : (m, w, 3) float32, metres, world; hidden : (C,) bool, clusters not visible from these points
+        origin : (m, w, 3) float32, metres, world; hidden : (C,) bool, clusters of the separate stratum
         """
         hidden = hidden & (all_emitters.chance > 0)
         if not hidden.any() or not (all_emitters.chance[~hidden] > 0).any():

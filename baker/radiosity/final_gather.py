@@ -84,7 +84,8 @@ def final_gather(
     seen : SeenLight
         Light that texels reflect, from `Sides.seen_light`.
     analytic : (n,) uint8
-        `DirectLight.analytic`: 1 for entries to which rays that hit visible emitters add nothing.
+        `DirectLight.analytic`: 1 for entries whose direct light is computed in closed form, so rays that hit
+        visible emitters add nothing.
     sampling : EmitterSampling
         Emitters that rays may hit, and the numbers of rays for their MIS weights.
     sky : tuple of float
@@ -104,8 +105,8 @@ def final_gather(
     shading, chooser = sampling.needed_shading(), sampling.chooser(job.chart)
 
     def work(begin: int, end: int) -> Part:
-        # Choose emitters for the same entries as `direct_light`: the last tile with fronts may also contain
-        # backs.
+        # Choose emitters for the same tile as `direct_light`. The last tile with fronts may also contain
+        # backs, which are not gathered.
         whole = min(begin + TILE, job.n)
         origin, normal = job.tile_points(begin, whole)
         buffers, out = job.packet_buffers(), np.zeros((end - begin, N_COLUMNS), np.float32)

@@ -42,8 +42,8 @@ from baker.radiosity.trace_job import TraceJob
 _TILE = 256
 # Largest number of passes of `sinkhorn_balance` over all rows.
 _BALANCE_STEPS = 30
-# Uncertainty of a measured row sum, as a number of rays, for a patch none of whose rays hits a patch. If a
-# share of its rays hits no patch, the uncertainty is this number times that share.
+# Factor of the uncertainty of a measured row sum. In rays, the uncertainty is this factor times the share of
+# the patch's rays that hit no patch.
 _SLACK = 4.0
 
 
@@ -336,8 +336,8 @@ def _balanced(
     first, column, value, exchanged, unlike = merged
     reciprocity = unlike / max(exchanged, 1e-300)
     goal = 1.0 - sky.astype(np.float64) - lost
-    # Estimate the uncertainty of each measured row sum. The uncertainty is 0 in a closed scene, where no ray
-    # misses.
+    # Estimate the uncertainty of each measured row sum. The uncertainty is 0 in a closed scene, where every
+    # ray hits a patch.
     slack = _SLACK * (1.0 - goal) * len(area) / max(rays, 1)
     row_error = sinkhorn_balance(first, column, value, goal, slack, np.ones(len(area)), _BALANCE_STEPS)
     return FormFactorMatrix(first, column, value, sky, lost, float(row_error), reciprocity, rays)

@@ -9,7 +9,7 @@ light from outside, the ceiling would show a bright line.
 A bilinear lookup at a point of a neighbouring texel reads the invalid texel with a certain weight. For each
 region, these weights are summed over all valid points of the neighbours in the region. The invalid texel gets
 the region with the largest sum. If all sums are 0, the texel gets the region of the nearest texel of its
-chart.
+chart that has a region.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ def gap_level(texels: TexelBuffer, job: TraceJob) -> tuple[NDArray[np.uint8], in
     cast = np.zeros(-(-n // TILE), np.int64)
 
     def work(begin: int, end: int) -> None:
-        # Use the median texel side of the tile for all its texels, which are neighbours.
+        # Use the same ray length for all texels of the tile, computed from their median area.
         side = np.sqrt(np.median(texels.area[begin:end]))
         points = job.tile_points(begin, end)
         for share, sides in ((far, _FAR), (near, _NEAR)):

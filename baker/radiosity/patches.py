@@ -80,9 +80,8 @@ def build_patches(
 ) -> PatchSet:
     """Group texel entries into patches: square blocks whose side is a power of two.
 
-    The side is the smallest that gives at most `max_patches` blocks, but at most 256 texels. A chart smaller
-    than a block is still a separate patch, so an atlas of very many charts may have more than `max_patches`
-    patches.
+    The side is the smallest that gives at most `max_patches` blocks, but at most 256 texels. No patch
+    contains texels of two charts, so an atlas of very many charts may have more than `max_patches` patches.
 
     Parameters
     ----------
@@ -90,13 +89,13 @@ def build_patches(
         The n entries.
     level : (n,) uint8, optional
         Gap level, 0 to 2 (`radiosity.narrow_gaps`); 0 if omitted. Entries of different levels belong to
-        different patches. Entries of level 2 form smaller blocks, which add at most about `max_patches`
+        different patches. Entries of level 2 may form smaller blocks, which add at most about `max_patches`
         patches.
     max_patches : int
         Intended largest number of patches, without the additional patches in narrow gaps.
     link : (m, 2) int32, optional
-        Pairs of neighbouring entries with mutually visible points (`radiosity.sides.Sides.link`). In charts
-        with such pairs, a block is split into the parts that the pairs connect.
+        Linked pairs of neighbouring entries (`radiosity.sides.Sides.link`). In charts with such pairs, a
+        block is split into the parts that the pairs connect.
 
     Returns
     -------

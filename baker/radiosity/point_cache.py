@@ -92,7 +92,8 @@ def tile_points(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return `origin` and `normal` (m, 16, 3) of entries begin to end - 1, see `points_of`.
 
-    If `cache` holds the points, they are read from it; else they are computed and stored there.
+    If `cache` holds the points, they are read from it. Otherwise they are computed and, if there is a cache,
+    stored in it.
     """
     if cache is None:
         return points_of(surface, valid_points, np.arange(begin, end))

@@ -5,13 +5,14 @@ meet has points on both sides of the other surface. A single value per texel wou
 sides.
 
 Therefore the points of such a texel are grouped by mutual visibility (`radiosity.kernels.sides`). Each group,
-called a side, becomes a texel entry (a row of `TexelBuffer`). In general, the side with most points gets the
-texel's original entry, which is a front or a back; fronts are stored in the page. The other sides get new
-entries after all backs. The new entries take part in light transport but are not stored in the page.
+called a side, becomes a texel entry (a row of `TexelBuffer`). In general, the side with the most points keeps
+the texel's original entry. If this entry is a front, its values are stored in the page. The other sides get
+new entries after all backs. The new entries take part in light transport but are not stored in the page.
 
-Neighbouring texels are linked if some of their points are mutually visible. The connected parts of a chart
-are its regions. Filters of the finished page do not mix values of different regions. Two texels of a block
-that no chain of links within the block connects belong to different patches (`radiosity.patches`).
+Neighbouring texels are linked if some of their points are mutually visible. Two unsplit texels are linked
+without this test, unless another surface crosses both. The connected parts of a chart are its regions.
+Filters of the finished page do not mix values of different regions. A patch contains only texels that links
+within its block of texels connect (`radiosity.patches`).
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ class Sides:
     table : SideTable
         Points of the split texels, from which kernels find the side that a ray hit.
     link : (m, 2) int32
-        Pairs of neighbouring entries with mutually visible points, in charts that another surface cuts.
+        Linked pairs of neighbouring entries, in charts that another surface cuts.
     rays : int
         Number of rays cast.
     """
@@ -286,7 +287,7 @@ def _cut(
 
 
 def neighbours(texels: TexelBuffer, chosen: NDArray[np.bool_], *, both: bool = False) -> NDArray[np.int32]:
-    """Return pairs of entries of one chart whose texels share an edge. Both are fronts, or both are backs.
+    """Return pairs of entries of one chart whose texels share an edge, both fronts or both backs.
 
     Parameters
     ----------
@@ -335,7 +336,7 @@ def _of_sides(pair: NDArray[np.int32], groups: _Groups) -> NDArray[np.int32]:
 
 
 def _see(job: TraceJob, entries: _Entries, pair: NDArray[np.int32]) -> tuple[NDArray[np.bool_], int]:
-    """Return (m,) bool, whether a tested pair of points is mutually visible, and the number of rays cast.
+    """Return (m,) bool, whether a point of one entry is visible from a point of the other, and the ray count.
 
     pair : (m, 2) int32, entries
     """
@@ -371,7 +372,7 @@ def _keep_largest(
 ) -> Sides:
     """Give the side that `_order_sides` chooses the texel's original entry, and number the regions.
 
-    link : (m, 2) int32, pairs of neighbouring entries with mutually visible points, in the charts `cut`
+    link : (m, 2) int32, linked pairs of neighbouring entries, in the charts `cut`
     cut : (c,) int32, charts with split texels, or with neighbouring texels that are not linked
     backs : (S, groups) float64, from `_back_share`
     """

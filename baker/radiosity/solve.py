@@ -7,9 +7,9 @@ With the exitance M = s + rho E, which is the radiosity without emission, and th
     (A / rho - A F) M = A s / rho
 
 The matrix A / rho - A F is symmetric by reciprocity, and positive definite for rho < 1. Conjugate gradients,
-preconditioned by A / rho, need a few dozen products with F. Jacobi sweeps would need thousands in a closed
-scene of albedo 0.99. If the number of bounces is fixed, one product is computed for each bounce after the
-first.
+preconditioned by A / rho, need a few dozen products with F. Jacobi iteration would need thousands of products
+in a closed scene of albedo 0.99. If the number of bounces is fixed, one product is computed for each bounce
+after the first.
 
 The norms of conjugate gradients are sums over all patches. Patches of a dim room beside a sunlit street
 contribute almost nothing to these sums, so the iteration could stop before these patches have converged.
@@ -40,19 +40,18 @@ from baker.radiosity.form_factors import FormFactorMatrix
 from baker.radiosity.kernels.conjugate_gradients import conjugate_step
 from baker.radiosity.kernels.form_factor import multiply, multiply_coloured
 
-# Limit of the relative error of a patch's exitance, estimated from its residual. Below this limit, the patch
-# has converged.
+# Largest relative error of the exitance of a converged patch, as estimated from its residual.
 TOLERANCE = 3e-5
 # Largest total number of iterations of conjugate gradients.
 MAX_ITERATIONS = 1000
-# Number of stored matrix elements for which one more thread is used.
+# Number of stored matrix elements for each thread beyond the first.
 _PART = 250_000
 # Lower limit of the exitance with which a patch's residual is compared, as a share of the largest source
 # exitance of the same colour. Because of this limit, nearly black patches do not delay the solve.
 _DARK = 1e-15
-# Limit of the ratio of the residual norm to its initial value. Below this limit, conjugate gradients are
-# started again, because the search directions have lost orthogonality, and the residual of the iteration
-# differs from the true residual.
+# Share of its initial value to which conjugate gradients reduce the residual norm of a colour. They are then
+# started again, because the search directions have lost orthogonality, and the updated residual differs from
+# the true residual.
 _REDUCTION = 1e-12
 # Upper limit of albedo: with albedo 1, a closed scene has no solution.
 MAX_ALBEDO = 0.999
@@ -75,9 +74,9 @@ class Solution:
         |s + rho F M - M| / |s|, with Euclidean norms over the patches; the largest of the three colours. It
         is 0 for a fixed number of bounces.
     patch_error : float
-        Largest |s + rho F M - M| / ((1 - rho) max(M, dark)) of a patch and colour, with `dark` of `_Goal`. It
-        is an estimate of the largest relative error of a patch's exitance M. In a closed scene of uniform
-        light and albedo, it is an upper bound of that error. It is 0 for a fixed number of bounces.
+        Largest |s + rho F M - M| / ((1 - rho) max(M, dark)) of all patches and colours, with `dark` of
+        `_Goal`. It is an estimate of the largest relative error of a patch's exitance M. In a closed scene of
+        uniform light and albedo, it is an upper bound of that error. It is 0 for a fixed number of bounces.
     """
 
     irradiance: NDArray[np.float64]
@@ -122,8 +121,8 @@ def solve_radiosity(
     progress : Progress
         Called at the start and for each iteration.
     threads : int
-        Number of threads for products. Each matrix row is summed by one thread, so the result does not depend
-        on the number.
+        Largest number of threads for products. Each matrix row is summed by one thread, so the result does
+        not depend on the number.
 
     Returns
     -------
@@ -164,8 +163,8 @@ def _converge(
         share = goal.share(rest, exitance)
         if (share <= 1.0).all() or iterations >= MAX_ITERATIONS:
             break
-        # Leave out converged patches, because the rounding errors of bright patches exceed the residual of
-        # dim patches.
+        # Set residuals that are far below their limits to 0. The rounding errors of such bright patches would
+        # exceed the residuals of dim patches.
         rest[share <= goal.MARGIN] = 0.0
         before = iterations
         iterations = _conjugate_gradients(product, exitance, rest, albedo, area, goal, progress, before)
@@ -250,8 +249,8 @@ class _Goal:
     dark : (3,) float64, lx, lower limit of the exitance of each colour, see `_DARK`
     """
 
-    # Limit of the residual as a share of the allowed residual. If no patch exceeds this limit, conjugate
-    # gradients stop.
+    # Limit of the residual as a share of the allowed residual. Conjugate gradients stop for a colour if no
+    # patch exceeds this limit.
     MARGIN: ClassVar[float] = 0.5
     tolerance: NDArray[np.float64]
     dark: NDArray[np.float64]

@@ -83,7 +83,7 @@ def build_texels(
 
 
 class _Overlaps(NamedTuple):
-    """The n covered texels in Morton order, and the triangles that cover each texel.
+    """The n covered texels in Morton order, and for each texel the triangles of its chart that cover it.
 
     pixel : (n,) int64, (page * resolution + row) * resolution + column of each texel
     first : (n + 1,) int64, texel i is covered by the triangles `entry[first[i] : first[i + 1]]`

@@ -4,8 +4,8 @@ The share of a patch's light that remains after n reflections is
 
     s_n = (rho F) s_{n-1},   s_0 = 1        rho: albedo, F: form factors
 
-In a closed scene of uniform albedo rho, s_n = rho^n, and the light of all bounces is 1 / (1 - rho) times the
-direct light.
+In a closed scene of uniform albedo rho, s_n = rho^n, and the sum of direct and reflected light is 1 / (1 -
+rho) times the direct light.
 """
 
 from __future__ import annotations
