@@ -227,7 +227,7 @@ def finish_page(
         if rules.signed:
             np.maximum(centred, flat.min(axis=0, initial=0.0), out=centred)
         total += centred
-        # Otherwise these arrays would exist until they are replaced, while the next layer is denoised.
+        # Free these arrays before the next layer is denoised.
         del filled, denoised, centred, flat
     rules.clip(total)
     grown_value, grown = dilate(

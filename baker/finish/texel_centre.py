@@ -28,8 +28,7 @@ from baker.finish.kernels.page_slope import match_lookups, move_to_centre
 from baker.finish.page import check_page, highest_of_charts
 from baker.finish.tiles import over_rows
 
-# Smallest centroid offset that is corrected, texels. Centroids of texels that another surface divides
-# (`radiosity.sides`) are means of up to 16 points.
+# Smallest centroid offset that is corrected, texels.
 SMALLEST_OFFSET = 0.02
 
 

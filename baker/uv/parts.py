@@ -15,12 +15,12 @@ JOB_TRIANGLES = 20_000
 SPLIT_TRIANGLES = 40_000
 # xatlas treats neighbours as one plane if their normals differ by less than about 2.5 degrees. xatlas joins
 # such neighbours transitively, so that a finely tessellated sphere becomes one "planar" chart. SMOOTH_DOT is
-# about the cosine of that angle. Triangles joined by this rule form a region. A region of more than
-# SMOOTH_TRIANGLES triangles is cut if it is not flat, see MIN_FACING.
+# the cosine of a slightly larger angle, 3.1 degrees. Triangles joined by this rule form a region. A region of
+# more than SMOOTH_TRIANGLES triangles is cut if it is not flat, see MIN_FACING.
 SMOOTH_DOT = 0.9985
 SMOOTH_TRIANGLES = 500
-# Smallest cosine, of about 40 degrees, between the normals of a flat region and their mean. A region with a
-# smaller cosine is cut until no block has a smaller cosine.
+# Smallest cosine between the normals of a flat region and their mean; 0.77 is the cosine of about 40 degrees.
+# A region with a smaller cosine is cut until no block has a smaller cosine.
 MIN_FACING = 0.77
 
 

@@ -21,7 +21,7 @@ from baker.uv.xatlas_charts import ChartJob, FlatCharts, cut_charts
 # Limit of the number of triangles of all jobs. Below this limit, the jobs run in this process, because
 # starting a worker process takes 0.2 s, which is longer than cutting the triangles.
 IN_PROCESS_TRIANGLES = 3000
-# Largest time, seconds, between the end of a worker's pipe and the end of the worker process.
+# Time to wait for the end of a worker process after its pipe has closed, seconds. The process is then killed.
 _MOMENT = 1.0
 # Values of `Popen.returncode` of a process in which native code crashed.
 _CRASHES = {-getattr(signal, name, 0) for name in ("SIGSEGV", "SIGABRT", "SIGBUS", "SIGFPE", "SIGILL")}

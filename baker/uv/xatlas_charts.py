@@ -75,9 +75,8 @@ def cut_charts(job: ChartJob, chart_faces: int = CHART_FACES) -> FlatCharts:
     Returns
     -------
     FlatCharts
-        Charts, numbered over the whole job. Triangles that xatlas considers degenerate have chart -1. If more
-        than a thousandth of a chart's area is flipped in uv or has almost no area in uv, all triangles of the
-        chart have chart -1, too.
+        Charts, numbered over the whole job. Triangles that xatlas considers degenerate have chart -1. All
+        triangles of a chart that is folded or lacks area in uv have chart -1, too; see `_drop_flat`.
     """
     part = np.repeat(np.arange(job.n_parts), np.diff(job.first_triangle))
     corner = job.position[job.triangle.astype(np.int64) + job.first_vertex[part][:, None]]

@@ -28,8 +28,8 @@ _BORDER, _CONTACT = 0.4, 0.5
 _POOL = 16
 # Number of points in each texel of a footprint, and in each tested texel.
 _POINTS_PER_TEXEL, _POOL_POINTS = 16, 8
-# Largest distance between two points of the same surface, texels, and smallest cosine of the angle between
-# their face normals.
+# Two points count as points of the same surface if their distance is below _MAX_TEXELS texels, and the cosine
+# of the angle between their face normals is above _MIN_COSINE.
 _MAX_TEXELS, _MIN_COSINE = 4.0, 0.5
 
 
@@ -55,8 +55,9 @@ class EdgePoints:
 def border_texels(owner: NDArray[np.int32], covered: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return (P, H, W) bool: the border texels of charts.
 
-    These are covered texels with a neighbour that is not covered or lies on another object. Uncovered texels
-    with surface are border texels if the highest object index of their covered neighbours is their object.
+    These are covered texels with a neighbour that is not covered or lies on another object. An uncovered
+    texel with surface is a border texel if the highest object index of its covered neighbours is the index of
+    its own object.
 
     Parameters
     ----------

@@ -13,8 +13,8 @@ from baker.metrics.misalignment import best_shift, exponent, is_blurred
 from baker.verification.criteria.criterion import ChannelData, Criterion, CriterionResult
 
 # Ratio of the squared errors with and without a shift, below which a chart counts as shifted. It is smaller
-# than the ratio for a whole map (`metrics.misalignment`), because charts have few texels and there are many
-# charts.
+# than the ratio for a whole map (`metrics.misalignment`). With many charts of few texels each, some charts
+# fit better by chance if they are shifted.
 _CHART_BETTER = 0.5
 
 

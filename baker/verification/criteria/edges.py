@@ -1,4 +1,4 @@
-"""Compares bilinear lookups of the map, as in an engine, at chart borders, next to walls, between texels."""
+"""Compares bilinear lookups of the map with the reference at chart borders, next to walls, between texels."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from baker.metrics.texel_area import look_up
 from baker.verification.criteria.criterion import ChannelData, Criterion, CriterionResult
 from baker.verification.criteria.groups import make_groups, worst_metrics
 
-# Limits above which a point is wrong: error divided by the largest of value, reference and dark floor, and
-# error divided by the standard error. Both must be exceeded.
+# Limits above which a point is wrong: error divided by the largest of value, reference and `dark_floor`, and
+# error divided by the standard error. A wrong point exceeds both.
 _WRONG, _Z = 0.5, 4.0
 # Number of points below which no metrics are computed.
 _MIN_POINTS = 8

@@ -10,7 +10,7 @@ from baker.metrics.error_metrics import dark_floor
 from baker.verification.criteria.criterion import ChannelData, Criterion, CriterionResult
 
 # Limits above which a component of a texel is wrong: error divided by the largest of value, reference and
-# dark floor, and error divided by the standard error. Both must be exceeded.
+# `dark_floor`, and error divided by the standard error. A wrong component exceeds both.
 _WRONG, _Z = 0.3, 4.0
 
 
