@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from baker.core.settings import BakeSettings
 
 # Intended largest number of patches, which are the blocks of texels that radiosity treats as one surface
-# element. Blocks are enlarged up to 256 texels a side to stay within it. Patches in narrow gaps have the same
-# limit and are counted separately.
+# element. Blocks are enlarged up to 256 texels a side to stay within this number. Patches in narrow gaps have
+# a separate limit of the same size.
 MAX_PATCHES = 32768
 # Smallest and largest number of rays from each patch for its form factors. The number is that of the
 # hemisphere rays per texel, clamped to these limits.

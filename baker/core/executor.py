@@ -1,6 +1,6 @@
 """Defines the interface of executors, which run the tiles of ray stages in this process or on a cluster.
 
-A tile is a range of texels or patches that is computed at a time.
+A tile is a range of texels or patches that one call of a stage's function computes.
 """
 
 from __future__ import annotations

@@ -6,7 +6,8 @@ L is the luminance of the radiance. For a part of a textured triangle, L is the 
 of a two-sided triangle is twice as large. Textured triangles are cut into parts (`lights.emissive_texture`),
 and each part is an emitter. The radiance at a point of a part is looked up in the texture. In three cases,
 the part has its exact mean radiance instead: the texture is constant in the part, the part is very small
-(`_SMALL`), or its radiance varies too much (`_SPARSE`). In triangles with alpha, it is always looked up.
+(`_SMALL`), or its radiance varies too much (`_SPARSE`). In triangles with alpha, the radiance is always
+looked up.
 
 Based on: see `kernels.emitters`.
 """

@@ -58,7 +58,7 @@ _Z, _Z_FEW = 3.0, 32.0
 _MIN_COLOUR_SHARE = 0.3
 # Lower limit of the denominator of differences if the reference is black, as a share of the bright light.
 _BLACK = 1.0e-3
-# The reference of a group counts as black if its sum is below this number times the standard error of the
+# The reference of a group counts as black if its sum is at most this number times the standard error of the
 # sum.
 _LIT = 3.0
 # Relative rms noise of the reference above which the lower bound of the own error is 0.

@@ -195,8 +195,8 @@ def _reflected(
         albedo = patches.mean(texels.albedo, weight)
         from_sky = np.pi * matrix.open * sky
         direct = patches.mean(complete, weight) + from_sky
-        # Multiply direct light by the albedo of each texel, and light of the sky, known per patch only, by
-        # the mean albedo of the patch.
+        # Multiply direct light by the albedo of each texel. Multiply light of the sky by the mean albedo of
+        # the patch, because it is known per patch only.
         source = patches.mean(texels.albedo * complete, weight) + albedo * from_sky
         solution = solve_radiosity(
             matrix,

@@ -11,7 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-# Number of rows up to which a dictionary is faster than NumPy: scenes may have many small meshes.
+# Up to this number of rows, a dictionary is used, which is then faster than NumPy. Scenes may have many
+# meshes with few rows.
 FEW = 64
 
 
