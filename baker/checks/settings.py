@@ -51,8 +51,8 @@ class CheckSettings(Settings):
 def with_extras(settings: CheckSettings, scene: Scene) -> CheckSettings:
     """Add the settings in the scene's `extras.baker.check` to settings of a check.
 
-    The extras of the document may have `fail_on`, which is used if `settings` has none, and `ignore`. The
-    extras of a node with a mesh may have `ignore`: a code, a list of codes, or true for all codes. These
+    The extras of the document may have `ignore` and `fail_on`. `fail_on` is used only if `settings` has none.
+    The extras of a node with a mesh may have `ignore`: a code, a list of codes, or true for all codes. These
     codes are ignored for all objects with the name of the node. The extras of nodes are read only if the
     scene was loaded with `lenient=True`.
 

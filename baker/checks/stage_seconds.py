@@ -12,9 +12,9 @@ from baker.core.parallel import thread_count
 from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
 
-# Seconds times threads per ray, for numbers of rays that `Workload.rays` estimates. These rates are used for
-# stages whose speed in an earlier bake is unknown. They were measured on interior.glb with 1024 texels a
-# side, see docs/PERFORMANCE.md.
+# Seconds times threads per ray, where the number of rays is the estimate of `Workload.rays`. These rates are
+# used for stages whose speed in an earlier bake is unknown. They were measured on interior.glb with 1024
+# texels a side, see docs/PERFORMANCE.md.
 _RAY_SECONDS: Mapping[Stage, float] = {
     Stage.INSIDE_GEOMETRY: 3.2e-7,
     Stage.DIRECT_LIGHT: 1.2e-7,

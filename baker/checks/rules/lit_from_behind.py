@@ -31,8 +31,8 @@ def lit_from_behind(context: CheckContext) -> Iterator[RawFinding]:
     faces are wound the wrong way. The direct light of emitters and of lights with a position is compared on
     both sides, at 2048 random points of the scene. Parallel light and the sky are ignored, because they reach
     the backs of the walls of every room from outside. Closed meshes are not reported here, but by the rule
-    `inside-out`. An object is reported if light arrives at the backs of more than half of its points, and
-    none of these points is on a double-sided face.
+    `inside-out`. An object is reported only if light arrives at the back at more than half of its points, and
+    none of its points is on a double-sided face.
     """
     world = context.world
     some = any(kind_of(light).has_position for light in context.scene.local_lights)

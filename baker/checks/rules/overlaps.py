@@ -97,9 +97,10 @@ def _crossings(facts: MeshFacts, threads: int) -> tuple[NDArray[np.int64], int]:
 
 
 def _may_cross(facts: MeshFacts) -> bool:
-    """Return whether boxes of two faces overlap that have at most one welded vertex in common.
+    """Return whether two faces with at most one common welded vertex have overlapping bounding boxes.
 
-    Each edge of a face has an end in all faces that share two of its vertices, and is no crossing there.
+    Faces with two common vertices need no test. Each edge of one such face ends at a vertex of the other
+    face, so it does not pierce the other face.
     """
     low, high = facts.corner.min(axis=1), facts.corner.max(axis=1)
     gap = _DEPTH * float((high.max(axis=0) - low.min(axis=0)).max())

@@ -15,7 +15,8 @@ from baker.core.readable import number
 
 # Smallest number of different uv values from which rounding is recognised.
 _FEWEST_VALUES = 16
-# Numbers of bits that are tried, and the largest distance of a value from a level, in levels.
+# Numbers of bits that are tried, and the largest distance of a value from a multiple of the rounding step, as
+# a share of the step.
 _BITS, _SLACK = range(6, 15), 0.02
 # Spacing of half floats between 0.5 and 1.
 _HALF_SPACING = 2.0**-11
