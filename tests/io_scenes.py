@@ -26,7 +26,7 @@ def rich_builder() -> GltfBuilder:
 
     The nodes are
 
-    - 0: a skinned square with morph targets, made of two primitives of triangles and one of lines;
+    - 0: a skinned mesh with morph targets: a square of triangles, a square as a strip, and lines;
     - 1: the mesh of node 0;
     - 2: a joint;
     - 3: a camera;
@@ -54,7 +54,7 @@ def rich_builder() -> GltfBuilder:
     for name in ("WEIGHTS_0", "COLOR_0"):
         accessors[first["attributes"][name]]["normalized"] = True
     accessors[first["attributes"]["POSITION"]] |= {"min": [0, 0, 0], "max": [1, 1, 0], "name": "points"}
-    # Vertex attributes of two or three bytes have to be padded to four bytes an element.
+    # In glTF, each element of a vertex attribute starts at a multiple of four bytes.
     heat, colour = np.array([10, 20, 30, 40], "<u2").view(np.uint8), np.arange(12, dtype=np.uint8)
     for name, data in (("COLOR_0", colour), ("_HEAT", heat)):
         rows = data.reshape(4, -1)
@@ -163,7 +163,7 @@ def quad_result(folder: Path, **settings: object) -> BakeResult:
 
 
 def write_timed_bake(out: Path, n_texels: int, **members: object) -> None:
-    """Write a bake of the unit square into `out`, with the given members of its manifest."""
+    """Write a bake of the unit square into `out`. Its manifest gets `n_texels` and the given members."""
     write_bake(quad_result(out.parent / f"source of {out.name}"), out)
     manifest = json.loads((out / "bake.json").read_text("utf-8"))
     manifest["instances"][0]["texels"] = n_texels

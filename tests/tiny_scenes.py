@@ -124,7 +124,10 @@ def joined(scene, order=slice(None)):
 
 
 def quad_atlas(scene, size, inset=0.0):
-    """Return an atlas in which each quad fills a cell of a square grid, up to a border of `inset` texels."""
+    """Return an atlas in which each quad has one cell of a square grid.
+
+    A quad starts `inset` texels from the lower corner of its cell. Its side is cell - 1 - 2 inset texels.
+    """
     side = int(np.ceil(np.sqrt(len(scene.instances))))
     cell = size // side
     layouts = []

@@ -1,4 +1,4 @@
-"""Files that single exports write hold the numbers that their engines expect."""
+"""The files of each export hold the numbers that its engine expects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Contract of every importer: every format gives the same square, and broken files give an `InputError`."""
+"""Contract of every importer: it reads the same square, and reads or refuses broken files."""
 
 from __future__ import annotations
 

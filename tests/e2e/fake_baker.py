@@ -1,4 +1,4 @@
-"""Runs the `baker` command with a fake pipeline; the first argument names how it hangs or fails."""
+"""Runs the `baker` command with a fake pipeline. The first argument names how the pipeline hangs or fails."""
 
 from __future__ import annotations
 

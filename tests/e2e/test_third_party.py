@@ -40,7 +40,7 @@ def test_scene_bakes_or_is_refused_in_one_sentence(path):
         assert np.isfinite(value).all()
         assert value.min() >= 0
     assert ao.max() <= 1
-    # The sky of 1 cd/m2 lights some texels. Albedos are at most 0.999, so E is at most pi / (1 - 0.999).
+    # The sky of 1 cd/m2 lights some texels.
     assert irradiance[covered].max() > 0.1
     energy = result.solve["energy"]
     assert energy["absorbed"] + energy["escaped"] == pytest.approx(energy["emitted"], rel=1e-2)

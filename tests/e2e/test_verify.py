@@ -88,7 +88,7 @@ def test_a_sound_bake_passes(sound):
     assert light["texels"] == ao["texels"] == pytest.approx(400, abs=20)
     assert abs(light["bias"]) < 0.01
     assert light["median"] < 0.03
-    # Most of the median error is noise of the path-traced reference. The figure `noise_floor` is this noise.
+    # Much of the median error is noise of the path-traced reference. The figure `noise_floor` is this noise.
     assert 0.3 * light["median"] < light["noise_floor"] < light["median"] * 1.2
     assert ao["rmse"] < 0.02
     assert light["shift"] == [0, 0]

@@ -1,4 +1,4 @@
-"""Starts the browser that all engine tests share, as a fixture."""
+"""Fixtures of the engine tests: one browser, and the exports of the probe and the room."""
 
 from __future__ import annotations
 

@@ -155,7 +155,7 @@ class Editor:
             for number in dict.fromkeys(p.get("material") for p in mesh["primitives"]):
                 slot = StaticMaterial()
                 name = "None" if number is None else document["materials"][number]["name"]
-                # Plain materials, not instances.
+                # The importer makes plain materials, not instances.
                 slot.values |= {"material_slot_name": name, "material_interface": Material()}
                 slots.append(slot)
             made.values["static_materials"] = slots
@@ -350,7 +350,7 @@ class MaterialEditingLibrary:
 
 
 def _set(instance, name, value, kind):
-    """Set a parameter of the parent material. As in the engine, the return value is always False."""
+    """Set a parameter that the parent material has. As in the engine, the return value is always False."""
     assert isinstance(instance, MaterialInstanceConstant), "parameters can be set in instances only"
     assert isinstance(value, kind)
     calls = [

@@ -1,4 +1,4 @@
-"""PlayCanvas in headless Chromium draws the export `playcanvas` correctly, and changed exports wrongly."""
+"""PlayCanvas in headless Chromium draws the export `playcanvas` correctly. Changed exports look different."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""three.js draws the export `unlit`, which needs no module, correctly."""
+"""three.js draws the export `unlit` correctly, without code of `baker`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """`baker view` in a browser: pixels and displayed numbers are compared with the files of the bake.
 
 Expected pixel positions follow from the camera in `scene.glb`. Expected colours follow from the EXR and PNG
-files of the bake, which the test reads with the decoders that `baker view` uses, too.
+files of the bake. Tests and `baker view` read them with the same decoders.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ from baker.viewer.server import make_server
 pytestmark = pytest.mark.engines
 # Largest permitted difference of a pixel, sRGB bytes. Texture unit and frame buffer may round up or down.
 LEVELS = 2
+# Displayed linear value of the median luminance, as in the viewer's main.js.
 MIDDLE = 0.35
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -261,7 +262,7 @@ def test_a_click_tells_object_texel_and_the_exact_value(page):
             assert float(page.field("ao")) == page.ao[number, row, column, 0]
             assert page.field("status") == "covered"
             x, y, z = (float(word) for word in page.field("position").split()[:3])
-            # Half a pixel is 2.4 mm wide in the scene.
+            # The tolerance is less than a pixel, which is about 6 mm wide in the scene.
             np.testing.assert_allclose((x, y, z), world(at, s, t), atol=0.004)
 
 
@@ -314,14 +315,13 @@ def test_every_switch_shows_its_quantity(page):
     assert page.ask("document.getElementById('exposure-value').innerText") == "+1.0 EV"
     page.show("5", "status")
     # The colour of a texel is the legend's colour of its status, times the brightness of the headlight. The
-    # brightness is 1 for a surface that is seen along its normal.
+    # brightness is 0.55 + 0.45 cos a, where a is the angle between the surface normal and the direction to
+    # the camera.
     for kind, place in ((1, (0.1, 0.1)), (3, (0.25, 0.75)), (4, (0.55, 0.45))):
         row, column = texel_at(painted_uv(*place))
         assert page.status[0, row, column] == kind
         swatch = f"getComputedStyle(document.querySelectorAll('#legend .swatch')[{kind}]).backgroundColor"
         colour = [int(part) for part in re.findall(r"\d+", page.ask(swatch))]
-        # In general it is 0.55 + 0.45 cos a, where a is the angle between the surface normal and the
-        # direction to the camera.
         x, y, _ = world(PAINTED_AT, *place)
         light = 0.55 + 0.45 * 5 / np.sqrt(x * x + y * y + 25)
         assert close(page.pixel(page.spot(*world(PAINTED_AT, *place))), np.array(colour) * light)

@@ -1,4 +1,4 @@
-"""Other programs read the pages for the web: ktx-parse; three.js and Babylon.js, which draw every texel."""
+"""ktx-parse reads KTX2 pages. three.js and Babylon.js draw every texel of KTX2 and WebP pages."""
 
 from __future__ import annotations
 

@@ -145,7 +145,7 @@ def damaged(scene: Path, folder: Path, rng: Generator) -> str | None:
 
 
 def view(out: Path, page: Path) -> None:
-    """Build the viewer page of a bake, as files and as the table of the server, without opening a browser.
+    """Build the viewer page of a bake as static files and as the server's answers, without a browser.
 
     All addresses must be of files inside the page, and all contents must be readable.
     """

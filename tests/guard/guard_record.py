@@ -1,4 +1,4 @@
-"""Runs the command lines of the guard with one program, and records the files they write and their output."""
+"""Runs the guard's command lines with one version of `baker`. Records the output and the written files."""
 
 from __future__ import annotations
 

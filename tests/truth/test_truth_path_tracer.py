@@ -93,7 +93,7 @@ def compared():
 def test_every_texel_agrees_within_error_bars(compared):
     bakes, mean, error = compared
     away = bakes.mean(axis=0) - mean
-    # The tolerance combines both standard errors and 1 % of the mean. The 1 % are needed because the bake's
+    # The tolerance combines both standard errors and 1 % of the mean. The 1 % is needed because the bake's
     # light after the first bounce is constant over a patch.
     both = np.sqrt(error**2 + bakes.var(axis=0, ddof=1) / SEEDS + (0.01 * mean) ** 2)
     assert np.median(error / mean) < 0.02

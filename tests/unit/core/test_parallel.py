@@ -1,4 +1,4 @@
-"""`run_tiles` processes each item once, raises the error of a tile, can be cancelled, and ends threads."""
+"""`run_tiles` processes each item once, raises a tile's error, can be cancelled, and ends its threads."""
 
 from __future__ import annotations
 

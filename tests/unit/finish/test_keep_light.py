@@ -1,4 +1,4 @@
-"""`keep_light` restores the light that denoising removed, in windows of texels of one chart."""
+"""`keep_light` restores most of the light that denoising removed, in windows of texels of one chart."""
 
 from __future__ import annotations
 

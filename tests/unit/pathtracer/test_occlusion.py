@@ -1,4 +1,4 @@
-"""Neighbouring points share packets of occlusion rays. Neither order nor packets affect the results."""
+"""Neighbouring points share packets of occlusion rays. Only rays that graze an edge may change by this."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Texels on both sides of another surface are split into sides, which lookups of rays distinguish."""
+"""A texel that extends to both sides of a wall is split into sides. Lookups of rays choose one side."""
 
 from __future__ import annotations
 

@@ -131,7 +131,8 @@ def test_fit_page_finds_the_density_of_a_single_square():
     shapes = rectangles(np.array([[2.0, 2.0]]))
     found = fit_page(shapes, np.array([0]), (100, 2), silent, (0, 1))
     assert found is not None
-    # Without the border of 1 texel on each side, 98 texels are left. Their outer centres are 97 texels apart.
+    # Without the border of 1 texel on each side, 98 texels are left. The first and the last of their centres
+    # are 97 texels apart.
     assert found[0] == pytest.approx(97 / 2, rel=0.006)
     assert found[1].scale[0, 0] == pytest.approx(97 / 2)
 

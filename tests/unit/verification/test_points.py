@@ -1,4 +1,4 @@
-"""`verify` assigns its points to rooms, gaps and charts, and gives lookups at edges their footprints."""
+"""`verify` assigns its points to rooms, gaps and charts, and computes the footprints of lookups at edges."""
 
 from __future__ import annotations
 

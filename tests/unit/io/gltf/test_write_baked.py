@@ -1,4 +1,4 @@
-"""`make_glb`: the written GLB has the uv of the atlas, and all other data equal those of the source file."""
+"""The GLB of `make_glb` has the uv and AO of the bake. All other data equal those of the source file."""
 
 from __future__ import annotations
 
