@@ -122,7 +122,7 @@ def test_both_triangles_of_a_rectangle_share_its_texels(nearest):
 
 
 def test_uv_without_area():
-    """The mean for three equal corners is the lookup there. The mean for corners on a line is the line's mean."""
+    """The mean for three equal corners is the lookup there. For corners on a line, it is the line's mean."""
     image = picture((5, 8), lit=1.0)
     pack, out = pack_textures([PackImage(image, ("repeat", "clamp"))]), np.zeros(4)
     place = np.array([0.37, 0.61])
