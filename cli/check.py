@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from baker.cli.command import Run, command
 from baker.cli.failures import FAILED_CHECK
 from baker.cli.fix import FixRequest, fix_request, fix_scene, fixed_json, write_fixed_text
 from baker.cli.flags import in_flags, values_in_flags
+from baker.core.printable import json_text
 from baker.core.settings import BakeSettings
 from baker.repairs.settings import RepairSettings
 
@@ -115,7 +115,7 @@ def _write_files(reports: list[CheckReport], *, sarif: Path | None, junit: Path 
         from baker.checks.sarif import sarif_log
 
         log = values_in_flags(sarif_log(reports, Path.cwd()))
-        write_text(sarif, json.dumps(log, indent=1, allow_nan=False) + "\n")
+        write_text(sarif, json_text(log, indent=1, only_ascii=True) + "\n")
     if junit is not None:
         from baker.checks.junit import check_junit
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
@@ -11,6 +10,7 @@ import typer
 from baker.cli.command import Run, command
 from baker.cli.outcome import report_outcome, write_failed, write_worst
 from baker.comparison.settings import DiffSettings
+from baker.core.printable import json_text, printable
 from baker.core.readable import percent
 from baker.metrics.figures import FIGURES, figure_text
 
@@ -45,10 +45,10 @@ def write_text(found: DiffReport, stream: TextIO, *, verbose: int) -> None:
     for warning in found.warnings:
         stream.write(f"warning: {warning.message}\n")
     for entry in found.differences:
-        stream.write(f"{entry['what']}: {_difference(entry, verbose)}\n")
+        stream.write(printable(f"{entry['what']}: {_difference(entry, verbose)}") + "\n")
     for name, objects in (("A", found.only_in_a), ("B", found.only_in_b)):
         for entry in objects:
-            stream.write(f"only in {name}: '{entry['object']}' (node {entry['node']})\n")
+            stream.write(f"only in {name}: '{printable(entry['object'])}' (node {entry['node']})\n")
     if found.unmatched:
         stream.write(f"{found.unmatched} points of A are not on B's surface\n")
     stream.write(f"{'':12}" + "".join(f"{name:>13}" for name in _COLUMNS) + "\n")
@@ -64,7 +64,7 @@ def write_text(found: DiffReport, stream: TextIO, *, verbose: int) -> None:
         shown = ", ".join(
             f"{column} {figure_text(column, figures[column])}" for column in ("bias", "p95", "colour_p95")
         )
-        stream.write(f"object: {name} of '{entry['object']}' (node {entry['node']}): {shown}\n")
+        stream.write(f"object: {name} of '{printable(entry['object'])}' (node {entry['node']}): {shown}\n")
     write_worst(found.worst[:most], stream)
     write_failed(found.verdicts, stream)
     verdict_text = ("passed" if found.passed else "FAILED") if found.verdicts else "done"
@@ -117,7 +117,7 @@ def _difference(entry: dict[str, Any], verbose: int) -> str:
 
 def _properties(light: Any) -> str:
     if not isinstance(light, dict):
-        return json.dumps(light)
+        return json_text(light)
     return ", ".join(f"{key} {_rounded(value)}" for key, value in light.items())
 
 
@@ -125,7 +125,7 @@ def _value(a: Any, b: Any) -> str:
     """Return two values with six significant digits, or with all digits if the first six are equal."""
     texts = _rounded(a), _rounded(b)
     if texts[0] == texts[1]:
-        texts = json.dumps(a), json.dumps(b)
+        texts = json_text(a), json_text(b)
     return f"{texts[0]} | {texts[1]}"
 
 
@@ -136,7 +136,7 @@ def _rounded(value: Any) -> str:
         return f"{value:.6g}"
     if isinstance(value, list):
         return f"[{', '.join(map(_rounded, value))}]"
-    return value if isinstance(value, str) else json.dumps(value)
+    return value if isinstance(value, str) else json_text(value)
 
 
 def _brief(value: Any, verbose: int) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import sys
 from typing import Any, TextIO
 
@@ -11,6 +10,7 @@ from baker.cli.flags import in_flags
 from baker.cli.foreign_flags import answer_error
 from baker.core import error_mapping as failure
 from baker.core.errors import BakerError, SettingsError
+from baker.core.printable import json_text, printable
 
 # Exit code of `check`, `verify` and `diff` if the result failed.
 FAILED_CHECK = 1
@@ -74,7 +74,7 @@ def report(error: BaseException, *, as_json: bool, traceback: bool, out: TextIO)
             "object": known.object,
         }
         with contextlib.suppress(OSError):  # a failure to write may be the error that is reported
-            out.write(json.dumps({"error": body}) + "\n")
+            out.write(json_text({"error": body}, only_ascii=True) + "\n")
             out.flush()
     return known.exit_code
 
@@ -93,7 +93,7 @@ def _line(error: BakerError) -> str:
         of_flag = isinstance(error, SettingsError) and error.object and not error.file
         named = in_flags(f"`{error.object}`").strip("`") if of_flag else error.object
         parts = [error.file, named, error.message]
-    return in_flags(_sentence(": ".join(part for part in parts if part)))
+    return in_flags(_sentence(printable(": ".join(part for part in parts if part))))
 
 
 def _sentence(text: str) -> str:

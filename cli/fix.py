@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from baker.core.errors import SettingsError
+from baker.core.printable import printable
 
 if TYPE_CHECKING:
     from baker.core.progress import Progress
@@ -71,11 +72,12 @@ def write_fixed_text(result: FixResult, request: FixRequest, stream: TextIO) -> 
     for fix in result.fixed:
         change = fix.change
         stream.write(
-            f"{request.scene}: fixed: {change.change}: '{fix.object}' (node {fix.node})"
+            f"{request.scene}: fixed: {change.change}: '{printable(fix.object)}' (node {fix.node})"
             f" {change.counted}: {change.before} -> {change.after}{_more(change)}\n"
         )
     for left in result.left_alone:
-        stream.write(f"{request.scene}: left alone: '{left.object}' (node {left.node}) {left.reason}\n")
+        name = printable(left.object)
+        stream.write(f"{request.scene}: left alone: '{name}' (node {left.node}) {left.reason}\n")
     if not result.fixed:
         stream.write(f"{request.scene}: nothing to fix\n")
 

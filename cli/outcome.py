@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import typer
 
 from baker.cli.failures import FAILED_CHECK
+from baker.core.printable import printable
 
 if TYPE_CHECKING:
     from baker.cli.command import Run
@@ -34,9 +35,8 @@ def write_worst(worst: Sequence[dict[str, Any]], stream: TextIO) -> None:
     """Write one line for each of the worst texels."""
     for entry in worst:
         texel = f"page {entry['page']}, row {entry['row']}, column {entry['column']}"
-        stream.write(
-            f"worst: {entry['channel']} of '{entry['object']}' at {texel}: {entry['error']:.1%} off\n"
-        )
+        name = printable(entry["object"])
+        stream.write(f"worst: {entry['channel']} of '{name}' at {texel}: {entry['error']:.1%} off\n")
 
 
 def write_limits(verdicts: Iterable[Verdict], stream: TextIO, *, default: bool) -> None:
@@ -59,4 +59,4 @@ def write_failed(verdicts: Iterable[Verdict], stream: TextIO) -> None:
     """Write the limits that were exceeded."""
     for verdict in verdicts:
         if verdict.failed:
-            stream.write(f"failed: {verdict.sentence()}\n")
+            stream.write(f"failed: {printable(verdict.sentence())}\n")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 import typer
 
 from baker.cli.command import Run, command
+from baker.core.printable import printable
 from baker.io.formats import scene_file_help
 from baker.rendering.settings import RenderSettings
 
@@ -43,7 +44,7 @@ def write_text(picture: Picture, out: Path, settings: RenderSettings, stream: Te
     from baker.rendering.write import tone_of
 
     for warning in picture.warnings:
-        where = f"{warning.object}: " if warning.object else ""
+        where = f"{printable(warning.object)}: " if warning.object else ""
         stream.write(f"warning: {where}{warning.message} [{warning.code}]\n")
     rate = picture.rays / max(picture.seconds, 1e-9) / 1e6
     stream.write(

@@ -9,6 +9,7 @@ from collections.abc import Collection
 from typing import TYPE_CHECKING, Any, TextIO
 
 from baker.cli.flags import in_flags
+from baker.core.printable import printable
 
 if TYPE_CHECKING:
     from baker.core.lightmap import BakeResult
@@ -64,7 +65,7 @@ def write_summary(
     for warning in manifest["warnings"]:
         if warning["message"] in noted:
             continue
-        where = f"{warning['object']}: " if warning.get("object") else ""
+        where = f"{printable(warning['object'])}: " if warning.get("object") else ""
         _write_line(f"warning: {where}{warning['message']} [{warning['code']}]", stream)
     if result.out is not None:
         out = shlex.quote(str(result.out))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from dataclasses import dataclass, field
 from typing import Any, TextIO
@@ -10,6 +9,7 @@ from typing import Any, TextIO
 from baker.cli.flags import values_in_flags
 from baker.cli.progress import Reporter
 from baker.cli.supervise import StopFlag, note_output
+from baker.core.printable import json_text
 
 
 @dataclass
@@ -42,7 +42,7 @@ class Session:
 
     def write_json(self, value: dict[str, Any]) -> None:
         """Write the JSON object of `--json`. Names of settings in its texts are converted to flags."""
-        self.out.write(json.dumps(values_in_flags(value), indent=2, allow_nan=False) + "\n")
+        self.out.write(json_text(values_in_flags(value), indent=2, only_ascii=True) + "\n")
 
     def text_stream(self, *, as_json: bool) -> TextIO:
         """Return the stream for text output: stderr if JSON is written to `out`, else `out`."""

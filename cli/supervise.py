@@ -197,9 +197,9 @@ class _Watch:
         sys.stderr.write(f"baker: {message}\n")
         sys.stderr.flush()
         if self.as_json:
-            import json
+            from baker.core.printable import json_text
 
             error = {"kind": kind, "message": message, "file": None, "object": None}
-            sys.stdout.write(json.dumps({"error": error}) + "\n")
+            sys.stdout.write(json_text({"error": error}, only_ascii=True) + "\n")
             sys.stdout.flush()
         return code

@@ -10,6 +10,7 @@ import typer
 from baker.cli.command import Run, command
 from baker.cli.flags import in_flags
 from baker.cli.outcome import report_outcome, write_failed, write_limits, write_worst
+from baker.core.printable import printable
 from baker.metrics.figures import FIGURES, figure_text
 from baker.verification.settings import VerifySettings
 
@@ -73,18 +74,19 @@ def write_text(found: VerifyReport, stream: TextIO, *, verbose: int) -> None:
     write_limits(found.verdicts, stream, default=found.settings.fail_if is None)
     write_failed(found.verdicts, stream)
     for problem in found.problems:
-        stream.write(f"failed: {problem}\n")
+        stream.write(f"failed: {printable(problem)}\n")
     compiling = f" and {found.compile_seconds:.0f} s of compiling" if found.compile_seconds >= 1 else ""
     single = "" if any(v.limit.metric == "max" for v in found.verdicts) else "single texels have no limit; "
     more = "" if verbose else "-v explains the figures; "
-    stream.write(f"{'passed' if found.passed else 'FAILED'}: {found.verdict}\n")
+    stream.write(f"{'passed' if found.passed else 'FAILED'}: {printable(found.verdict)}\n")
     stream.write(f"({single}{more}{found.seconds:.0f} s{compiling})\n")
 
 
 def _write_regions(regions: list[dict[str, Any]], stream: TextIO) -> None:
     for row in regions:
         if row["deviation"] > 0:
+            name = printable(row["region"])
             stream.write(
-                f"region: {row['channel']} of {row['region']} ({row['texels']} texels, {row['area']:.3g} m2):"
+                f"region: {row['channel']} of {name} ({row['texels']} texels, {row['area']:.3g} m2):"
                 f" {row['bias']:+.1%} +- {row['bias_se']:.1%}, typically {row['typical']:.1%} off\n"
             )

@@ -7,13 +7,13 @@ beside the scene file.
 from __future__ import annotations
 
 import contextlib
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from baker.core.errors import BakerError, InputError, SettingsError
+from baker.core.printable import json_text
 from baker.core.stage import Stage
 from baker.io.bake.output_folder import MANIFEST_NAME
 from baker.io.bake.read_manifest import read_manifest, read_unrecovered
@@ -108,7 +108,7 @@ def rates_beside(scene: Path) -> Rates | None:
             with contextlib.suppress(OSError, ValueError, BakerError):
                 # Validation takes long, so skip the bakes of other scenes first.
                 text = read_regular(folder / MANIFEST_NAME, most=_MOST_BYTES)
-                if json.dumps(scene.name, ensure_ascii=False)[1:-1].encode() not in text:
+                if json_text(scene.name)[1:-1].encode() not in text:
                     continue
                 manifest = read_unrecovered(folder)
                 if (folder / str(manifest["input"]["path"])).resolve() == scene.resolve():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from baker.core.printable import message_line, printable
+from baker.core.printable import message_line
 
 # Severities in ascending order. The index is the rank.
 SEVERITIES = ("info", "warning", "error")
@@ -28,10 +28,6 @@ class Location:
 
     object: str = ""
     node: int | None = None
-
-    def __post_init__(self) -> None:
-        """Convert the name with `printable`."""
-        super().__setattr__("object", printable(self.object))
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from fnmatch import fnmatchcase
 
 from baker.checks.rule import CHECKS
 from baker.core.names import unknown_name
+from baker.core.printable import printable
 
 
 @dataclass(frozen=True)
@@ -28,8 +29,9 @@ class Ignore:
     object: str = "*"
 
     def matches(self, code: str, name: str) -> bool:
-        """Return whether the pattern matches a finding's code and object."""
-        return fnmatchcase(code, self.code) and fnmatchcase(name, self.object)
+        """Return whether the pattern matches a finding's code and object; `name` also matches as printed."""
+        names = (name, printable(name))
+        return fnmatchcase(code, self.code) and any(fnmatchcase(text, self.object) for text in names)
 
 
 def parse_ignore(rules: Iterable[str]) -> list[Ignore]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from baker.checks.finding import SEVERITIES
 from baker.checks.rule import all_checks
 from baker.checks.run import CheckReport
+from baker.core.printable import printable
 from baker.io.junit import Case, junit_text
 
 
@@ -30,7 +31,8 @@ def check_junit(reports: Sequence[CheckReport]) -> str:
         limit = SEVERITIES.index(report.fail_on)
         for entry in all_checks():
             failing = [f for f in report.findings if f.code == entry.code and f.rank >= limit]
-            problem = "; ".join(f"{f.object}: {f.message}" if f.object else f.message for f in failing)
+            found = [(printable(f.object), f.message) for f in failing]
+            problem = "; ".join(f"{name}: {message}" if name else message for name, message in found)
             seconds = report.timings.get(entry.code, 0.0)
             cases.append(Case(entry.code, str(report.path), problem, seconds))
     return junit_text("baker check", cases)

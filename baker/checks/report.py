@@ -8,6 +8,7 @@ from typing import Any, TextIO
 from baker.checks.finding import SEVERITIES, Finding, finding_json
 from baker.checks.run import CheckReport
 from baker.checks.scenes import Unreadable
+from baker.core.printable import printable
 
 # Largest number of findings of one code and severity that are written without `verbose`.
 SHOWN = 3
@@ -78,7 +79,8 @@ def write_text(report: CheckReport, stream: TextIO, *, verbose: int = 0, cost: b
         _write_group(str(report.path), group, stream, verbose=verbose)
         if group[0].code == "cost":
             for entry in group[0].found.more["objects"]:
-                stream.write(f"    {entry['percent']:6.2f}%  {entry['texels']:9} texels  {entry['object']}\n")
+                name = printable(entry["object"])
+                stream.write(f"    {entry['percent']:6.2f}%  {entry['texels']:9} texels  {name}\n")
     counts = _counts(report)
     parts = [f"{counts[name]} {name}{'s' if counts[name] != 1 else ''}" for name in reversed(SEVERITIES)]
     tail = f", {len(report.ignored)} ignored" if report.ignored else ""
@@ -105,7 +107,7 @@ def _write_group(path: str, group: list[Finding], stream: TextIO, *, verbose: in
 
 
 def _subject(finding: Finding) -> str:
-    where = f" '{finding.object}'" if finding.object else ""
+    where = f" '{printable(finding.object)}'" if finding.object else ""
     return where if finding.node is None else f"{where} (node {finding.node})"
 
 

@@ -12,6 +12,7 @@ from typing import Any
 from baker.checks.finding import Finding, finding_json
 from baker.checks.rule import Check, all_checks
 from baker.checks.run import CheckReport
+from baker.core.printable import printable
 from baker.core.version import VERSION
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -69,11 +70,12 @@ def _rule(entry: Check) -> dict[str, Any]:
 
 def _result(finding: Finding, index: dict[str, int], uri: str, *, suppressed: bool) -> dict[str, Any]:
     location: dict[str, Any] = {"physicalLocation": {"artifactLocation": {"uri": uri}}}
-    if finding.object:
+    name = printable(finding.object)
+    if name:
         node = "" if finding.node is None else f"nodes[{finding.node}]"
-        logical = {"name": finding.object, "kind": "object"}
+        logical = {"name": name, "kind": "object"}
         location["logicalLocations"] = [{**logical, "fullyQualifiedName": node} if node else logical]
-    where = f"{finding.object}: " if finding.object else ""
+    where = f"{name}: " if name else ""
     result: dict[str, Any] = {
         "ruleId": finding.code,
         "ruleIndex": index[finding.code],
@@ -81,7 +83,7 @@ def _result(finding: Finding, index: dict[str, int], uri: str, *, suppressed: bo
         "message": {"text": f"{where}{finding.message}. To do: {finding.fix}."},
         "locations": [location],
         # The fingerprint depends on neither other findings nor counts, so it stays equal if these change.
-        "partialFingerprints": {"object/v1": f"{finding.code}@{finding.object}"},
+        "partialFingerprints": {"object/v1": f"{finding.code}@{name}"},
         "properties": finding_json(finding),
     }
     if suppressed:

@@ -26,16 +26,16 @@ class BakerError(Exception):
     exit_code = 1
 
     def __init__(self, message: str, *, file: str | None = None, object: str | None = None) -> None:
-        # Replace line breaks and control characters in each text, because names from a file may contain them.
+        # Names in the message may contain line breaks and control characters.
         message = message_line(message)
         super().__init__(message)
         self.message = message
-        self.file = None if file is None else printable(file)
-        self.object = None if object is None else printable(object)
+        self.file = file
+        self.object = object
 
     def __str__(self) -> str:
         """Return file, object and message in one line."""
-        where = ": ".join(part for part in (self.file, self.object) if part)
+        where = ": ".join(printable(part) for part in (self.file, self.object) if part)
         return f"{where}: {self.message}" if where else self.message
 
 

@@ -1,9 +1,15 @@
-"""Converts text from files to one line without control characters, for terminals, logs and reports."""
+"""Converts text from files to text without control characters, for terminals, logs, reports and JSON.
+
+Readers keep names as they are in the file. Each output converts them: text with `printable`, and JSON with
+`json_text`.
+"""
 
 from __future__ import annotations
 
+import json
 import re
 import unicodedata
+from typing import Any
 
 # Length above which a value from a file is shortened in a message, characters.
 LONGEST_VALUE = 80
@@ -90,11 +96,66 @@ def printable_lines(text: str) -> str:
     return "\n".join(map(printable, text.split("\n")))
 
 
+def json_text(value: Any, *, indent: int | None = None, only_ascii: bool = False) -> str:
+    r"""Return a value as JSON, in which invisible characters are escapes such as `\u001b`.
+
+    JSON itself requires escapes only for the characters below U+0020. A reader of the JSON gets the names of
+    the scene unchanged.
+
+    Parameters
+    ----------
+    value : object
+        A value that consists of dicts, lists, strings, finite numbers, booleans and None.
+    indent : int or None
+        Spaces for each level of nesting; None writes one line.
+    only_ascii : bool
+        Whether all other characters above U+007F are escapes, too.
+
+    Returns
+    -------
+    str
+        JSON, which can be encoded as UTF-8.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite.
+    """
+    text = json.dumps(value, indent=indent, ensure_ascii=only_ascii, allow_nan=False)
+    lines = text.split("\n")
+    return "\n".join(line if line.isprintable() else "".join(map(_in_json, line)) for line in lines)
+
+
+def without_surrogates(text: str) -> str:
+    r"""Return a text that UTF-8 can encode: lone surrogates are replaced by escapes such as `\ud800`.
+
+    Parameters
+    ----------
+    text : str
+        Any text.
+
+    Returns
+    -------
+    str
+        The text without surrogates.
+    """
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
 def _shown(letter: str) -> str:
     if letter in "\n\r\t":
         return " "
-    # Also escape the last two code points of each Unicode plane, which are not characters. XML forbids two of
-    # these code points.
-    if letter in _JOINERS or not (unicodedata.category(letter) in _ESCAPED or ord(letter) & 0xFFFE == 0xFFFE):
+    return letter.encode("unicode_escape", "surrogatepass").decode("ascii") if _is_hidden(letter) else letter
+
+
+def _in_json(letter: str) -> str:
+    if not _is_hidden(letter):
         return letter
-    return letter.encode("unicode_escape", "surrogatepass").decode("ascii")
+    units = letter.encode("utf-16-be", "surrogatepass")
+    return "".join(f"\\u{units[k : k + 2].hex()}" for k in range(0, len(units), 2))
+
+
+def _is_hidden(letter: str) -> bool:
+    # The last two code points of each Unicode plane are not characters. XML forbids two of these code points.
+    hidden = unicodedata.category(letter) in _ESCAPED or ord(letter) & 0xFFFE == 0xFFFE
+    return hidden and letter not in _JOINERS

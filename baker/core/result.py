@@ -38,7 +38,7 @@ class Result:
 
     def __repr__(self) -> str:
         rows = ", ".join(f"{name} {_words(value)}" for name, value in self.summary().items())
-        return f"<{type(self).__name__}: {rows}>"
+        return printable(f"<{type(self).__name__}: {rows}>")
 
     def _repr_html_(self) -> str:
         rows = "".join(

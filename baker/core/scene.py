@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.origin import scene_origin
-from baker.core.printable import message_line, printable
+from baker.core.printable import message_line
 from baker.core.result import Result
 from baker.core.source_mesh import SourceScene
 
@@ -219,9 +219,8 @@ class SceneWarning:
     object: str = ""
 
     def __post_init__(self) -> None:
-        """Convert the message with `message_line`, and the name of the object with `printable`."""
+        """Convert the message to one line with `message_line`."""
         object.__setattr__(self, "message", message_line(self.message))
-        object.__setattr__(self, "object", printable(self.object))
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from baker.core.encoding import DecodedImage, encoding_of
+from baker.core.printable import json_text
 from baker.io.gltf.packer import objects
 
 MANIFEST_NAME = "bake.json"
@@ -71,7 +72,7 @@ def write_text(path: Path, text: str) -> None:
 
 def write_json(path: Path, value: dict[str, Any]) -> None:
     """Write indented JSON."""
-    write_text(path, json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    write_text(path, json_text(value, indent=2) + "\n")
 
 
 def link_file(source: Path, target: Path) -> None:

@@ -11,6 +11,7 @@ from dataclasses import replace
 from fnmatch import fnmatchcase
 
 from baker.core.errors import InputError
+from baker.core.printable import printable
 from baker.core.scene import Scene, SceneWarning
 from baker.core.source_mesh import SourceScene
 
@@ -117,5 +118,7 @@ class _Names:
                 at, steps = self._parent.get(at), steps + 1
             chain.reverse()
             paths = ["/".join(chain[: k + 1]) for k in range(len(chain))]
-            self._known[node, name] = list(dict.fromkeys([*chain, *paths]))
+            texts = [*chain, *paths]
+            # A user copies a name as `baker inspect` prints it.
+            self._known[node, name] = list(dict.fromkeys([*texts, *map(printable, texts)]))
         return self._known[node, name]

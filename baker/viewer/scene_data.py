@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from baker.core.colour import LUMINANCE_WEIGHTS
 from baker.core.geometry import Geometry, world_geometry
 from baker.core.lightmap import TexelStatus
+from baker.core.printable import printable
 from baker.core.scene import Material, Texture
 from baker.io.bake.read_bake import StoredBake
 from baker.shading.materials import corner_uv, vertex_colour
@@ -67,9 +68,9 @@ def scene_data(bake: StoredBake) -> SceneData:
     source = str(bake.manifest.get("input", {}).get("path") or "")
     header = {
         # Use the name of the input file, because `scene.glb` has the same name in every bake.
-        "name": PurePath(source).stem or bake.folder.resolve().name,
-        "folder": str(bake.folder.resolve()),
-        "input": source,
+        "name": printable(PurePath(source).stem or bake.folder.resolve().name),
+        "folder": printable(str(bake.folder.resolve())),
+        "input": printable(source),
         "baker": bake.manifest.get("versions", {}).get("baker", ""),
         "created": bake.manifest.get("created", ""),
         "resolution": bake.atlas.resolution,
@@ -141,7 +142,7 @@ def _groups(geometry: Geometry, order: NDArray[Any]) -> list[dict[str, int]]:
 def _instance(bake: StoredBake, index: int) -> dict[str, Any]:
     instance, layout = bake.scene.instances[index], bake.atlas.layouts[index]
     return {
-        "name": instance.name,
+        "name": printable(instance.name),
         "node": instance.node,
         "page": layout.page,
         "density": layout.texels_per_metre,
@@ -159,7 +160,7 @@ def _material(material: Material, images: list[NDArray[Any]]) -> dict[str, Any]:
         return {"image": number, "wrap": list(used.wrap)}
 
     return {
-        "name": material.name,
+        "name": printable(material.name),
         "colour": list(material.base_colour),
         "colourMap": texture(material.base_colour_texture),
         "emission": list(material.emission),

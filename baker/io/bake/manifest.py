@@ -19,6 +19,7 @@ import numpy as np
 
 from baker.core.light_kind import kind_of
 from baker.core.lightmap import BakeResult, Lightmap
+from baker.core.printable import json_text
 from baker.core.scene import SceneWarning
 from baker.core.version import VERSION as BAKER_VERSION
 
@@ -103,7 +104,7 @@ def make_manifest(
 
 def manifest_text(manifest: dict[str, Any]) -> str:
     """Return the manifest as the text of `bake.json`."""
-    return json.dumps(manifest, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json_text(manifest, indent=2) + "\n"
 
 
 def manifest_schema() -> dict[str, Any]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from baker.core.errors import InputError
+from baker.core.printable import printable
 from baker.io.bake.manifest import manifest_schema
 from baker.io.bake.output_folder import MANIFEST_NAME, own_files
 from baker.io.bake.recovery import recover
@@ -108,7 +109,7 @@ def _where(path: Any) -> str:
 
 
 def _short(text: str) -> str:
-    text = "".join(c if c.isprintable() else "?" for c in text)
+    text = printable(text)
     return text if len(text) <= 2 * _SHORT else f"{text[:_SHORT]} ... {text[-_SHORT:]}"
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any, NoReturn
 
 from baker.core.errors import InputError
-from baker.core.printable import printable
+from baker.core.printable import without_surrogates
 
 
 class JsonObject:
@@ -110,9 +110,8 @@ class JsonObject:
         value = self._get(key, default)
         if not isinstance(value, str):
             self.fail(f"expected a string, found {_show(value)}", key)
-        # Make names printable, because they are printed and written to reports and exports. A lone surrogate
-        # cannot be written to a file.
-        return printable(value) if key == "name" else value
+        # Names are written to files, which cannot hold a lone surrogate.
+        return without_surrogates(value) if key == "name" else value
 
     def strings(self, key: str) -> list[str]:
         """Return a list of strings (empty if absent)."""

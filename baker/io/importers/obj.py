@@ -10,7 +10,6 @@ import hashlib
 import math
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,6 @@ from numpy.typing import NDArray
 
 from baker.core.colour import linear_from_srgb
 from baker.core.errors import IndexRangeError, InputError
-from baker.core.printable import printable
 from baker.core.scene import Material, Scene, SceneWarning
 from baker.core.source_mesh import SourcePrimitive
 from baker.io.images import decode_image
@@ -67,15 +65,13 @@ def import_obj(source: SceneFile) -> Scene:
     )
     groups: list[tuple[str, list[SourcePrimitive]]] = []
     for number, shape in enumerate(reader.GetShapes()):
-        name = printable(shape.name) or f"shape_{number}"
+        name = shape.name or f"shape_{number}"
         groups.append((name, _primitives(shape.mesh, corners, len(materials))))
     if any(p.material == len(materials) for _, primitives in groups for p in primitives):
         if materials:
             message = f"faces without a known material are grey; MTL names {len(materials)}"
             warnings.append(SceneWarning("no-material", message, source.path.name))
         materials.append(GREY)
-    # Make names printable only now, because the parser matches materials by their names in the file.
-    materials = [replace(material, name=printable(material.name)) for material in materials]
     return scene_of_meshes(source, groups, materials, warnings, digest.hexdigest())
 
 
