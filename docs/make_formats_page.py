@@ -23,11 +23,12 @@ generates this page from the code.
 - *read*: what is read of the extension.
 - *used in the bake*: what it changes in the lightmap.
 - *in scene.glb*: whether `scene.glb` and fixed files contain it.
-- *refused*: how the sentence ends with which a file is refused that lists the extension in
-  `extensionsRequired`: "the file requires the extension NAME, ...". Without an entry, such files are read.
+- *refused*: a file that lists the extension in `extensionsRequired` is refused with "the file requires the
+  extension NAME, " and this text. Without a text, such files are read.
 
-A file that requires an extension which is not in the table is refused with "{unknown}". If a file only uses
-such an extension, the bake ignores it with the warning `extension-ignored`, and `scene.glb` keeps it.
+A file that requires any other extension is refused with the text "{unknown}".
+If a file only uses such an extension, the bake ignores it with the warning `extension-ignored`, and
+`scene.glb` keeps it.
 
 """
 
