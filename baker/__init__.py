@@ -14,7 +14,7 @@ from __future__ import annotations
 from baker.core.version import VERSION
 
 # The command line imports this module before it can handle Ctrl-C, so do not import `typing`, which takes
-# several milliseconds. Type checkers know this name.
+# several milliseconds. Type checkers recognise the name `TYPE_CHECKING`.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any

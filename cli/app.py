@@ -93,8 +93,8 @@ def _dispatch(argv: list[str], session: Any) -> int:
 
 
 def _without_interrupts(unraisable: Any) -> None:
-    # Python prints a KeyboardInterrupt that is raised in a callback of the interpreter and continues. Do not
-    # print it. The work stops anyway, because the signal also set the flag.
+    # If a KeyboardInterrupt is raised in a destructor or a similar callback, Python prints it and continues.
+    # Do not print it. The work stops anyway, because the signal also set the flag.
     if not issubclass(unraisable.exc_type, KeyboardInterrupt):
         sys.__unraisablehook__(unraisable)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 
-# Weight of the assumption that work takes the expected time, seconds of expected work. The weight of the
-# measurement is the expected seconds of the finished stages.
+# Weight of the assumption that work takes the expected time, seconds. The weight of the measured durations is
+# the expected duration of the finished stages, seconds.
 _PRIOR_SECONDS = 2.0
 # Share of a stage that must be done before the stage's duration is extrapolated from its progress.
 _ENOUGH = 0.1

@@ -40,8 +40,8 @@ def read_config(path: Path, name: str = TOP_TABLE) -> dict[str, Any]:
     Raises
     ------
     SettingsError
-        If the file cannot be read, is not TOML or has an unknown table. If `name` is not a table in the file.
-        If there are settings both at the top level and in `[bake]`.
+        If the file cannot be read, is not TOML or has an unknown table. If the value of the key `name` in the
+        file is not a table. If there are settings both at the top level and in `[bake]`.
     """
     document = _read_toml(path)
     for key, value in document.items():

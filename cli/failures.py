@@ -17,7 +17,7 @@ FAILED_CHECK = 1
 
 
 def explain(error: BaseException) -> BakerError | None:
-    """Convert an exception to a `BakerError`, also an error of the parser. Return None for other exceptions.
+    """Convert a known exception or a usage error of typer to a `BakerError`; return None for others.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Writes the message of an interrupted command. Only `os` is imported, so that this works at any time."""
+"""Writes the message of an interrupted command; imports only `os`, so that it also works during start-up."""
 
 from __future__ import annotations
 

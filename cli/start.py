@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-# `signal` imports `enum`, which takes longer than all other imports of this module.
+# Import `_signal`, because `signal` imports `enum`, which takes longer than all other imports here.
 import _signal  # type: ignore[import-not-found]
 import os
 import sys

@@ -72,8 +72,7 @@ def check(
     Parameters
     ----------
     scene : Scene, str or Path
-        A scene file, or a result of `load`. Most defects of a file for which `load` raises an error are
-        findings here.
+        A scene file, or a result of `load`. Most defects for which `load` raises an error are findings here.
     settings : CheckSettings, optional
         Which findings are ignored, which fail the check, and how cost is estimated.
     bake : BakeSettings, optional

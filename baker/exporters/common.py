@@ -104,8 +104,8 @@ def place_bake(bake: Path, target: Path, *, encodings: tuple[str, ...] = ()) -> 
         Folder of the bake.
     target : Path
     encodings : tuple of str
-        Encodings of which the files of a page are placed, too, if the bake has them. The page's entry in
-        `lightmap.json` lists them with file and largest value.
+        Encodings whose files are also placed, if the bake has them. The page's entry in `lightmap.json` lists
+        them with file and largest value.
     """
     manifest = read_manifest(bake)
     description = describe(manifest)

@@ -1,6 +1,7 @@
 """Writes files for PlayCanvas: scene.glb, the pages as Radiance HDR, and a module that loads both.
 
-PlayCanvas has no reader of EXR files. It finds an object by its mesh, because it changes repeated names.
+PlayCanvas has no reader of EXR files. The module finds an object by its mesh, because PlayCanvas changes
+repeated names.
 """
 
 from __future__ import annotations

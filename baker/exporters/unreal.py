@@ -23,7 +23,8 @@ from baker.exporters.common import (
 from baker.exporters.unreal_scene import TEXTURE_FOLDER, split_scene
 from baker.io.png import encode_png
 
-# White textures for parameters without a texture: the script imports one as a colour, the other as a page.
+# White textures for parameters without a texture: the script imports the first as a colour texture and the
+# second as a page.
 DEFAULTS = ("T_BakerWhite.png", "T_BakerPage.png")
 
 

@@ -1,8 +1,8 @@
 """Rewrites scene.glb for Unreal Engine: materials become entries of `lightmap.json`, textures become files.
 
-Unreal's importer would make lit materials. The script of the export makes its own, so that it needs to know
-neither names nor parameters of imported materials. Objects get their place in Unreal's units and axes: cm,
-z up, left-handed. The position (x, y, z) m in glTF is (100 x, 100 z, 100 y).
+Unreal's importer would create lit materials. The script of the export creates its own materials instead, so
+it needs neither the names nor the parameters of imported materials. The transforms of objects are converted
+to Unreal's units and axes: cm, z up, left-handed. The position (x, y, z) m in glTF is (100 x, 100 z, 100 y).
 
 Based on: Unreal Engine, GLTFCore, ConversionUtilities.h (axes, quaternions) and InterchangeGltfTranslator.cpp
 (centimetres; the slots of a mesh have the names of its materials).
@@ -35,7 +35,8 @@ CENTIMETRES = 100.0
 # Extensions of materials and textures, which the rewritten scene no longer has.
 _REMOVED = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "EXT_materials_", "MSFT_texture_dds")
 _KEPT = ("KHR_materials_variants",)
-# Largest deviation from orthogonal axes that is no shear.
+# Largest absolute difference between an element of the unit axes and of the nearest rotation. Above it, a
+# transform counts as sheared.
 _SHEAR = 1e-3
 
 Json = dict[str, Any]

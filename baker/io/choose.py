@@ -1,7 +1,8 @@
 """Selects the objects of a bake by wildcard patterns of their names.
 
-A case-sensitive pattern with `*`, `?` or `[abc]` is compared with the name of a node and with its path from
-the root, such as `House/Floor 1/*`. A pattern that matches a node also selects all nodes below it.
+A pattern such as `Lamp*` or `House/Floor 1/*` is compared with the name of a node and with its path from the
+root. Patterns are case-sensitive, and `*`, `?` and `[abc]` are wildcards. A pattern that matches a node also
+selects all nodes below it.
 """
 
 from __future__ import annotations

@@ -33,8 +33,8 @@ def read_regular(path: Path | str, *, most: int = LARGEST, first: int | None = N
     most : int
         Largest accepted size, bytes; a larger file is refused before it is read.
     first : int, optional
-        Read only the first bytes, at most this number. `most` then limits the number of bytes that are read
-        and not the size of the file.
+        Read at most this number of bytes, from the start of the file. `most` then limits the number of bytes
+        that are read and not the size of the file.
 
     Returns
     -------

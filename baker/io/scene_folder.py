@@ -53,7 +53,7 @@ class SceneFolder:
         base : Path, optional
             Folder of the file that contains the name; by default the folder of the scene.
         first : int, optional
-            Read only the first bytes, at most this number.
+            Read at most this number of bytes, from the start of the file.
 
         Returns
         -------

@@ -172,8 +172,8 @@ def _unless_locked(
 ) -> list[NDArray[np.bool_]]:
     """Return the masks `flips`, or masks of False if a locked primitive has a face to flip.
 
-    `flips` has one mask (T,) of faces to flip for each primitive. In the second case, a sentence with the
-    defect `what` is added to `left`.
+    `flips` has one mask (T,) of faces to flip for each primitive. If a locked primitive has a face to flip, a
+    sentence with the defect `what` is added to `left`.
     """
     locked = [p.locked for p, flip in zip(primitives, flips, strict=True) if p.locked and flip.any()]
     if not locked:

@@ -122,7 +122,7 @@ class _Edges:
     count : (E,) int64
         Number of faces at each edge.
     second : (K,) int64
-        Indices of the half edges whose predecessor is of the same edge.
+        Indices of the half edges whose predecessor in this order belongs to the same edge.
     """
 
     def __init__(self, corner: NDArray[np.int64]) -> None:

@@ -58,7 +58,8 @@ def exchange_files(home: Path, out: Path, old: Collection[str], new: Collection[
     out : Path
         The output folder.
     old, new : collection of str
-        Paths relative to `out` and to the folder `NEW`. One of the new files is the manifest.
+        Paths of files: `old` relative to `out`, `new` relative to the folder `NEW`. One of the new files is
+        the manifest.
 
     Raises
     ------

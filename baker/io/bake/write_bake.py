@@ -58,8 +58,8 @@ def write_bake(
     force : bool
         Also write into a folder that contains files but no bake.
     progress : Progress
-        Called with stage, fraction and a name: after each page, each status image and `scene.glb` with the
-        name of the file, and before each export. A truthy return value cancels.
+        Called with stage, fraction done and a text: the name of the file, after each page, each status image
+        and `scene.glb`; "export" and its name, before each export. A truthy return value cancels.
     created : datetime or None
         Time to write into the manifest; None uses the current time.
 

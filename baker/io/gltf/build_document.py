@@ -89,7 +89,8 @@ def new_document(scene: Scene, atlas: Atlas) -> tuple[Packer, list[BakedUse], li
 def scene_name(scene: Scene) -> Json:
     """Return the name of a scene as glTF JSON, or {} if the scene was read from a file.
 
-    A scene that was read has the name of its file. Without the name, a renamed file gives the same bytes.
+    The name of a scene that was read is the name of its file. It is left out, so that the same scene under
+    another file name gives the same bytes.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Keeps invalid references of a glTF document invalid when `Packer` adds data to it.
 
-When buffers are merged and lists grow, a view that ends after its buffer would become valid, and so would an
-index after the end of a list. Both would then refer to other data.
+`Packer` merges all buffers and appends to lists. A view that extends past the end of its buffer would then
+become valid, and so would an index past the end of a list. Such references would yield unrelated data.
 """
 
 from __future__ import annotations

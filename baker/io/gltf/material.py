@@ -67,8 +67,8 @@ class MaterialReader:
         Raises
         ------
         InputError
-            For values of a wrong type or out of range. For a texture of base colour, or of emission if the
-            material emits, that cannot be read.
+            If a value has a wrong type or is out of range. If the texture of the base colour cannot be read,
+            or that of the emission of a material that emits.
         """
         if number == len(self._unread):
             if len(self.materials) == number:

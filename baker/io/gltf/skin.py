@@ -24,8 +24,8 @@ from baker.io.gltf.node import Placed, local_matrix
 # Number of attribute sets JOINTS_k / WEIGHTS_k that are read; each has four joints for each vertex.
 _MAX_SETS = 4
 # Largest absolute coordinate of the centre of a posed mesh's bounding box, divided by the box's longest edge.
-# Above this ratio, positions are stored relative to the centre, and the matrix of the mesh contains the
-# translation.
+# Above this ratio, float32 positions would lose precision. They are then stored relative to the centre, and
+# the matrix of the mesh contains the translation.
 _FAR = 8.0
 
 

@@ -1,7 +1,8 @@
 """Reads the base colour of a glTF material: metallic-roughness, specular-glossiness, or neither.
 
-The base colour is `baseColorFactor x baseColorTexture`. With KHR_materials_pbrSpecularGlossiness, it is
-`diffuseFactor x diffuseTexture`, also if there is a pbrMetallicRoughness, unless the material is unlit.
+The base colour is `baseColorFactor x baseColorTexture`. If a material has KHR_materials_pbrSpecularGlossiness
+and is not unlit, its base colour is `diffuseFactor x diffuseTexture`, and its pbrMetallicRoughness is
+ignored.
 
 Based on: Khronos Group, glTF 2.0 Specification, section 3.9.2; KHR_materials_pbrSpecularGlossiness.
 """

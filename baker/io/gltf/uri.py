@@ -47,7 +47,7 @@ def read_uri(uri: str, folder: SceneFolder, *, first: int | None = None) -> byte
     folder : SceneFolder
         Folder that relative names refer to.
     first : int, optional
-        Read only the first bytes of a file, at most this number.
+        Read at most this number of bytes, from the start of a file.
 
     Returns
     -------

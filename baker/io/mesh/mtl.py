@@ -58,8 +58,8 @@ def read_mtl(
     read_file : callable
         Returns the content of the file with a given name in a given folder. Raises OSError, ValueError or
         OutsideName if the file cannot be read.
-    Names of the materials that faces use. Errors in other materials are ignored, except `OutsideError`.
-        Names of the materials that faces use. Errors in other materials are ignored.
+    used : container of str
+        Names of the materials that faces use. Errors in other materials are ignored, except `OutsideError`.
     decode : callable
         Decodes the content of an image file; see `decode_image`.
 
@@ -207,7 +207,8 @@ def _map_options(words: list[str], file: str, material: str) -> tuple[list[str],
             shift[: len(values[:2])] = values[:2]
         elif option == "-s":
             stretch[: len(values[:2])] = values[:2]
-    # In OBJ v = 0 is the last image row, here the first: v' = 1 - (s (1 - v) + o).
+    # In OBJ, v = 0 is the last image row. In mesh uv and image uv, v = 0 is the first row. Therefore,
+    # v' = 1 - (s (1 - v) + o).
     transform = np.array(
         [[stretch[0], 0.0, shift[0]], [0.0, stretch[1], 1.0 - stretch[1] - shift[1]]], np.float64
     )

@@ -17,7 +17,7 @@ FOLDER = Path(__file__).parent
 TAG = "BakerLightmap"
 # Part of the names of shared assets. It changes with the graphs of the materials.
 VERSION = "2"
-# White textures, the values of parameters without a texture of their own: of pages, and of colours.
+# White textures for parameters without a texture: the first for pages, the second for colours.
 DEFAULT_PAGE, WHITE = "T_BakerPage", "T_BakerWhite"
 
 TOOLS = unreal.AssetToolsHelpers.get_asset_tools()
