@@ -25,9 +25,9 @@ from baker.finish.packing import pack_charts
 from baker.finish.texel_centre import recentre
 
 # Limit of the RMS relative noise of a brightness band, see `BAND`. A chart is denoised only if some of its
-# texels lie in a band of at least `FEWEST` texels above this limit. The filter hardly reduces smaller
-# errors. In the scene Cornell with 64 samples, the median error was 0.33 % with the filter and 0.35 %
-# without.
+# texels lie in a band whose noise is above this limit and that has at least `FEWEST` texels. The filter
+# hardly reduces smaller errors. In the scene Cornell with 64 samples, the median error was 0.33 % with the
+# filter and 0.35 % without.
 NOT_WORTH_FILTERING = 0.02
 # Largest ratio of the mean brightnesses of two charts or blocks in one brightness band.
 BAND = 8.0

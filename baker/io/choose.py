@@ -1,6 +1,6 @@
 """Selects the objects of a bake by wildcard patterns of their names.
 
-A pattern such as `Lamp*` or `House/Floor 1/*` is compared with the name of a node and with its path from the
+A pattern such as `Table*` or `House/Floor 1/*` is compared with the name of a node and with its path from the
 root. Patterns are case-sensitive, and `*`, `?` and `[abc]` are wildcards. A pattern that matches a node also
 selects all nodes below it.
 """

@@ -29,7 +29,7 @@ from baker.trace.packets import aligned_floats
 #     FACE        unit face normal (3)
 #     MATERIAL    row of `Surfaces.material`
 #     TWO_SIDED   1 if two-sided, else 0
-#     EMITTER     which emitter or emitters the triangle is, see `FoundEmitters.code`
+#     EMITTER     code of the triangle's emitters, see `FoundEmitters.code`
 #     TEXTURED    1 if a texture or vertex colours change its base colour, metalness or roughness, else 0
 #     EMISSION    radiance without texture, cd/m2 (3)
 #     SHINES      0: it emits nothing; 1: it emits without a texture; 2: it emits with a texture

@@ -51,8 +51,8 @@ _COST = 0.06
 # stratum.
 _FEW = 32
 # Limit of the total weight (power / distance^2) of hidden clusters, as a share of the visible clusters' total
-# weight. If there are more than _FEW clusters, the dimmest hidden clusters, up to this limit of their total
-# weight, are sampled together with the visible clusters.
+# weight. If the scene has more than _FEW clusters, the dimmest hidden clusters are sampled together with the
+# visible clusters, as many as have a total weight within this limit.
 _HARMLESS = 0.25
 # Limit of the ratio of the weights of two clusters. Above this limit, clusters may be chosen separately for
 # each block, see above.

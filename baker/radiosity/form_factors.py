@@ -3,7 +3,7 @@
     F_ij = share of the light leaving patch i that arrives at patch j
     A_i F_ij = A_j F_ji                         A: patch area
     sum_j F_ij + sky_i + lost_i = 1             sky: share of rays that leave the scene
-                                                lost: share of other rays that end at no patch
+                                                lost: share that hits a surface without a patch
 
 Each F_ij is merged with its reciprocal estimate A_j F_ji / A_i. Merging changes the row sums. Therefore the
 matrix is then balanced: it is scaled so that its row sums are again close to the measured row sums. The
@@ -42,8 +42,7 @@ from baker.radiosity.trace_job import TraceJob
 _TILE = 256
 # Largest number of passes of `sinkhorn_balance` over all rows.
 _BALANCE_STEPS = 30
-# Factor of the uncertainty of a measured row sum. In rays, the uncertainty is this factor times the share of
-# the patch's rays that hit no patch.
+# Factor in the uncertainty of a measured row sum: _SLACK (1 - row sum) / (number of rays from the patch).
 _SLACK = 4.0
 
 

@@ -11,8 +11,8 @@ new entries after all backs. The new entries take part in light transport but ar
 
 Neighbouring texels are linked if some of their points are mutually visible. Two unsplit texels are linked
 without this test, unless another surface crosses both. The connected parts of a chart are its regions.
-Filters of the finished page do not mix values of different regions. A patch contains only texels that links
-within its block of texels connect (`radiosity.patches`).
+Filters of the finished page do not mix values of different regions. If links do not connect all texels of a
+block, the block becomes several patches (`radiosity.patches`).
 """
 
 from __future__ import annotations

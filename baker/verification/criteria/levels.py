@@ -1,10 +1,10 @@
 """Computes the own error of each light level, in dark as well as in bright areas.
 
-The own error is defined in `baker.metrics.groups`. A light level contains all compared texels, in any room,
-whose light is within the same half power of ten. The darkest 5, 10 and 20 % of these texels are further
-groups, so that a fault of the darkest texels is not hidden among brighter texels. Narrower levels would not
-detect more faults: texels are assigned to levels by values that include the error, so a large error moves a
-texel to another level.
+The own error is defined in `baker.metrics.groups`. The levels divide the scale of light into intervals of a
+factor sqrt(10). A level contains the compared texels of all rooms whose light is in its interval. The darkest
+5, 10 and 20 % of all compared texels are further groups, so that a fault of the darkest texels is not hidden
+among brighter texels. Narrower levels would not detect more faults: texels are assigned to levels by values
+that include the error, so a large error moves a texel to another level.
 """
 
 from __future__ import annotations
