@@ -4,11 +4,11 @@ A `LightKind` contains everything that differs between kinds: the unit, the glTF
 irradiance at points for the bake, the emission for the path tracer, and the power. Other code reads the
 `LightKind` of a light and never compares names of kinds. A light of an unregistered kind is refused.
 
-The bake calls `fill`, which computes irradiance in a kernel of the light's file. The path tracer evaluates
-and samples the `EmissionProfile` that `emission` returns with its own kernels. A profile is data, so the
-kernels of the path tracer are the same for all kinds. The angular fall-off may be any function, given as a
-table. If these kernels called a function of each kind instead, their loops over eight paths would not
-vectorize, and each new kind would compile them again, which takes about a minute.
+The bake calls `fill`, which writes shadow rays and the unoccluded irradiance. The path tracer calls
+`emission`, which returns an `EmissionProfile`, and evaluates and samples the profile in its own kernels. A
+profile is data, so the kernels of the path tracer are the same for all kinds. The angular fall-off may be any
+function, given as a table. If these kernels called a function of each kind instead, their loops over eight
+paths would not vectorize, and each new kind would compile them again, which takes about a minute.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 PROC, CGROUPS = Path("/proc"), Path("/sys/fs/cgroup")
-# Limit of a control group from which on it counts as no limit, bytes. Version 1 of control groups reports
+# Smallest memory limit of a control group that counts as no limit, bytes. Version 1 of control groups reports
 # about 2^63 if there is no limit.
 _NO_LIMIT = 1 << 60
 

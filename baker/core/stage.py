@@ -12,8 +12,8 @@ class Stage(StrEnum):
     """A step of work that reports its progress under the name in its value.
 
     In the manifest, `timings` has the stages of a bake as keys, except `NARROW_GAPS`, which is a part of
-    `FORM_FACTORS`, and `DENOISE`, which is a part of `FINISH`. `rays` has those of these stages that cast
-    rays.
+    `FORM_FACTORS`, and `DENOISE`, which is a part of `FINISH`. The keys of `rays` are those stages among the
+    keys of `timings` that cast rays.
     """
 
     # Stages of a bake, in the order in which they begin. A bake leaves out stages that it does not need.

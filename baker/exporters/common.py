@@ -31,7 +31,8 @@ _KEPT = ("colourSpace", "software")
 def read_manifest(bake: Path) -> dict[str, Any]:
     """Return the manifest of a bake.
 
-    It is not validated: either the running bake has written it, or `baker.export` has read the bake.
+    The manifest is not validated, because either the running bake has written it, or `baker.export` has
+    called `read_bake`, which validates it.
     """
     manifest: dict[str, Any] = json.loads((bake / MANIFEST_NAME).read_text("utf-8"))
     return manifest
@@ -146,7 +147,8 @@ def write_page(bake: Path, file: str, target: Path, *, divisor: float, quantity:
     file : str
         Name of the page in the bake.
     target : Path
-        Its suffix selects the format. If it is that of `file`, the number format remains, too.
+        Its suffix selects the file format. If `file` has the same suffix, the number format is that of
+        `file`.
     divisor : float
     quantity, unit : str
         Meaning of the written numbers, for the header of the file.

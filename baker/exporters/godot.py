@@ -59,8 +59,8 @@ meshes/light_baking=1
 import_script/path="import_scene.gd"
 gltf/naming_version=1
 """
-# Import settings of an image with `slices` pages in Godot 4: 3 is "VRAM uncompressed", 1 is "optimized", that
-# is, linear. Mip levels would mix charts.
+# Import settings of an image with `slices` pages in Godot 4: `compress/mode=3` is "VRAM uncompressed", and
+# `channel_pack=1` is "optimized", that is, linear. Mip levels would mix charts.
 _IMPORT_LAYERS = """\
 [remap]
 
@@ -100,7 +100,8 @@ class GodotExport:
     def write(self, bake: Path, target: Path) -> None:
         """Write the files of the export into `target`."""
         document, named, binary = named_scene(bake)
-        # Godot would darken the lightmaps by these textures, and the lightmaps contain occlusion already.
+        # Remove occlusion textures: Godot would darken the lightmaps by them, but lightmaps contain occlusion
+        # already.
         for material in document.get("materials", []):
             material.pop("occlusionTexture", None)
         write_scene(target, document, binary)

@@ -50,7 +50,8 @@ class UnityExport:
     def write(self, bake: Path, target: Path) -> None:
         """Write the files of the export into `target`."""
         document, description, binary = named_scene(bake)
-        # Unity would darken the lightmaps by these textures, and the lightmaps contain occlusion already.
+        # Remove occlusion textures: Unity would darken the lightmaps by them, but lightmaps contain occlusion
+        # already.
         for material in document.get("materials", []):
             material.pop("occlusionTexture", None)
         write_scene(target, document, binary)
