@@ -25,7 +25,7 @@ from baker.pipeline.transport import trace_transport
 from baker.radiosity.inside_geometry import find_inside_geometry
 from baker.uv.unwrap import unwrap_scene
 
-# {stage of the bake: kind of rays of `bare.py` with whose rate the rate of the stage is compared}.
+# {stage of the bake: kind of rays in `bare.py` that its rate is compared with}.
 BESIDE = {
     Stage.FINAL_GATHER: "closest hit",
     Stage.FORM_FACTORS: "closest hit",

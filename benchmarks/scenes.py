@@ -25,7 +25,7 @@ HALF, HEIGHT = 5.0, 5.0
 CELLS = 8
 # Empty border of a cell, as a share of its side.
 GUTTER = 0.06
-# Factor of the bump function, whose values are within -1.5 to 1.5, on a sphere of radius 0.9 m, metres.
+# Height of the bumps, metres. A blob has the radius 0.9 m + `BUMP` times a function from -1.5 to 1.5.
 BUMP = 0.08
 # Radiance of the ceiling light, cd/m2.
 EMISSION = (60.0, 55.0, 48.0)

@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 
 def chi_square_chance(observed, expected):
-    """Return the p-value of Pearson's chi-square test of `observed` counts; both arrays have the same sum."""
+    """Return the p-value of Pearson's chi-square test of `observed` counts; `expected` may have any scale."""
     observed, expected = np.ravel(observed).astype(float), np.ravel(expected).astype(float)
     assert (observed[expected == 0] == 0).all()
     observed, expected = observed[expected > 0], expected[expected > 0]

@@ -1,4 +1,4 @@
-"""Kernels are in the right packages, and each package lists the packages whose kernels it compiles in."""
+"""Kernels are in the right packages, and each package lists the packages whose kernels its kernels use."""
 
 from __future__ import annotations
 

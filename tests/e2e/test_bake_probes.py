@@ -44,7 +44,8 @@ def test_sun_lies_on_the_floor_where_the_window_lets_it(interior):
     direct = 20000 * 0.62 / np.linalg.norm([0.72, 0.62, 0.31]) * (1.0 + 0.93 + 0.82) / 3
     spots = [sunlit(y) for y in (1.14, 1.17, 1.2)]
     lit = [interior.at(p, UP, within=0.02).mean() for p in spots]
-    # Texels are 10 cm wide, and the sunlit area between sill and rug is 25 cm wide.
+    # Texels are 10 cm wide, and the sunlit area between sill and rug is 25 cm wide, so texels may be partly
+    # shaded. Reflected light is added.
     assert 0.85 * direct < np.median(lit) < 1.6 * direct
     # Points mirrored in z, on the other side of the room, are in the shade.
     assert mean(interior, [(1.5, 0, 3.8), (4.5, 0, 3.6), (3.5, 0, 3.8)], UP) < 0.2 * direct
@@ -83,7 +84,8 @@ def test_panel_lights_the_study_from_above(interior):
     below = interior.at((6.9, 0, 2.3), UP).mean()
     aside = interior.at((5.4, 0, 3.8), UP).mean()
     assert below > 1.5 * aside
-    # Direct light of the panel, L A cos / r^2, is at most 2730 * 0.72 / 2.545^2 = 303 lx.
+    # Direct light of the panel, L A cos / r^2, is at most 2730 * 0.72 / 2.545^2 = 303 lx. Reflected light is
+    # added.
     assert 200 < below < 900
 
 

@@ -125,7 +125,7 @@ def test_wrong_use_and_missing_files(tree):
 
 
 def slow(tree):
-    """Replace the second job by a bake that takes long enough to be interrupted."""
+    """Write a job file with two jobs. The second bake takes long enough to be interrupted."""
     text = JOBS.replace('glob = "levels/*.glb"', 'scene = "levels/hall.glb"')
     more = "resolution = 1024\nsamples = 4096\nao_samples = 65536\n"
     (tree / "JOBS.toml").write_text(f'{text}\n[[job]]\nscene = "levels/room.glb"\n{more}')

@@ -1,7 +1,8 @@
 """Irradiance in levels built like those of games, sampled at surface points as an engine samples it.
 
 The expected value is 0 where no light can arrive, and a closed form where no light is reflected. All other
-values were path-traced once with 15,360 paths per point, and are given with their standard error.
+values were path-traced once with 15,360 paths per point, and are given with their standard error. Tolerances
+include the noise of the bake and the size of its texels.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ ASSETS = Path(__file__).parents[2] / "assets"
 FOLDER = ASSETS / "levels"
 KEPT = ("closed", "garage", "street", "tunnel", "warehouse")
 UP, DOWN, EAST, WEST, NORTH, SOUTH = (0, 1, 0), (0, -1, 0), (1, 0, 0), (-1, 0, 0), (0, 0, -1), (0, 0, 1)
-# Largest E in a dark room as a share of E outside: far from other surfaces, and within a texel of another
+# Largest E in a dark room as a share of E outside: far from other surfaces, and about a texel from another
 # surface.
 AWAY, BESIDE = 1e-4, 1e-3
 

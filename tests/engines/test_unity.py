@@ -71,7 +71,7 @@ def test_a_second_level_compiles(probe, package, built, tmp_path):
 
 
 def use(built, probe, tmp_path, change=lambda description: None):
-    """Return what `Use.cs` prints for two levels: for each title, the lines of each block with it."""
+    """Return what `Use.cs` prints for two levels: {title: the blocks with this title, as lists of lines}."""
     levels = [tmp_path / "first", tmp_path / "second"]
     for number, level in enumerate(levels):
         level.mkdir()

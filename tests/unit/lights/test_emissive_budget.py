@@ -1,4 +1,4 @@
-"""For emissive textures with many repeats, the work is limited; the power is the same as without a limit."""
+"""For emissive textures with many repeats, the work is limited. The power is nearly that without a limit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""BSDF samples, compared with their density by chi-square tests, and reflected energy with closed forms."""
+"""BSDF samples have their stated density (chi-square tests). The reflected energy equals closed forms."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def test_scattering_is_the_same_both_ways(name):
         ((1, 1, 1, 1, 0.01), 0.99, 1.001),
         # The model ignores light reflected more than once between microfacets, so a rough metal loses light.
         ((1, 1, 1, 1, 1.0), 0.30, 0.99),
-        # A white rough dielectric: the specular lobe has the share F that the diffuse part lacks.
+        # A white rough dielectric: the specular lobe reflects the share F, and the diffuse part 1 - F.
         ((1, 1, 1, 0, 1.0), 0.9, 1.001),
     ],
 )

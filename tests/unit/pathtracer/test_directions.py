@@ -1,4 +1,4 @@
-"""Scattering directions independent of the material, and camera rays, match their densities (chi-square)."""
+"""Directions sampled without regard to the material, and camera rays, have their stated densities."""
 
 from __future__ import annotations
 

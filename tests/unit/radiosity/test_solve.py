@@ -25,7 +25,7 @@ from baker.radiosity.solve import (
 def room(n, seed, open_sky=0.0):
     """Return (matrix, dense matrix, area, rng) of n patches with reciprocal form factors.
 
-    Rows sum to 1 - open_sky, except for the last patch, whose form factors are 0.
+    Rows sum to at most 1 - open_sky. All form factors from and to the last patch are 0.
     """
     rng = np.random.default_rng(seed)
     area = rng.uniform(0.2, 5, n)
