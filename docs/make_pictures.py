@@ -2,8 +2,8 @@
 
     python docs/make_pictures.py            needs only the dependencies of baker
 
-A pixel shows albedo * E / pi (what an engine draws for a diffuse surface), exposed so that the median
-pixel is mid grey, then sRGB-encoded.
+A pixel shows albedo * E / pi (what an engine draws for a diffuse surface), exposed so that the median of
+the lit pixels is 0.25, then sRGB-encoded.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ class Probe:
         self.normal = cross / np.maximum(2 * self.area, 1e-300)[:, None]
 
     def at(self, point: Any, normal: Any, channel: str = "irradiance", *, within: float = 5e-3) -> np.ndarray:
-        """Return the value (C,) at a world point at most `within` metres from a surface that faces `normal`."""
+        """Return the value (C,) at a point at most `within` metres from a surface that faces `normal`."""
         point, normal = np.asarray(point, float), np.asarray(normal, float)
         a, b, c = (self.corner[:, k] for k in range(3))
         u, v, w = b - a, c - a, point - a

@@ -1,4 +1,4 @@
-"""Form factors compared with closed forms, conservation and reciprocity."""
+"""Form factors agree with closed forms, are reciprocal, and conserve light."""
 
 from __future__ import annotations
 

@@ -103,6 +103,6 @@ def test_light_through_a_keyhole_is_found():
         result = builder.bake(seed=seed, samples=samples, bounces=0)
         return np.mean([quad.values(result).mean() for quad in own])
 
-    # The standard error of the truth is 1.5 %.
+    # The standard error of the truth is 1.5 %. `slack` is twice this error.
     truth = np.mean([light(seed, 2048) for seed in range(100, 104)])
     assert_unbiased([light(seed, 256) for seed in range(8)], truth, least=0.05, slack=0.03)

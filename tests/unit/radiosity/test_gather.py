@@ -76,7 +76,8 @@ def rays_of(room):
                 front = direction @ room.geometry.face_normal[prim] < 0
                 m = emitter_of.get(prim)
                 if m is not None and (front or room.geometry.double_sided[prim]):
-                    # Balance heuristic: expected hemisphere rays in this direction, divided by all rays.
+                    # Balance heuristic: the density of hemisphere rays in this direction, divided by that of
+                    # all rays.
                     radiance = room.shading.emission[room.geometry.material[prim]]
                     cosine, facing = (
                         direction @ normal[i, k],
