@@ -107,7 +107,7 @@ def test_wall_that_touches_an_emitter():
     square = np.array([(0, 0, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)], float)
     truth = wall.texel_mean(lambda p: polygon_irradiance(square, p, UP), 16)
     assert truth.mean() / np.pi == pytest.approx(0.2000438, rel=1e-3)
-    # `slack`: the quadrature of the truth has an error of up to 0.1 % at the common edge.
+    # `slack` is a margin: measured deviations are at most 0.016 %, and at most 3.3 standard errors.
     assert_unbiased([f.mean(axis=1) for f in found], truth.mean(axis=1), least=0.02, slack=0.001)
     assert np.max(found) < 1.1 * np.pi / 2
 
