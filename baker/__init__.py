@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from baker.core.progress import Progress
     from baker.core.scene import Scene
     from baker.core.settings import BakeSettings
+    from baker.io.settings import LoadSettings
     from baker.jobs.report import BatchReport
     from baker.jobs.settings import BatchSettings
     from baker.rendering.render import Picture
@@ -60,6 +61,7 @@ _HOMES = {
     "core.progress": ("Progress",),
     "core.scene": ("Scene",),
     "core.settings": ("BakeSettings",),
+    "io.settings": ("LoadSettings",),
     "jobs.report": ("BatchReport",),
     "jobs.settings": ("BatchSettings",),
     "rendering.render": ("Picture",),
@@ -88,6 +90,7 @@ __all__ = [
     "FixResult",
     "InputError",
     "Lightmap",
+    "LoadSettings",
     "Picture",
     "Progress",
     "RenderSettings",

@@ -96,8 +96,10 @@ def is_repeated(field: Any) -> bool:
 
 def flag_of(name: str, field: Any) -> str:
     """Return the flag of a setting. A switch that is on by default also has a flag that turns it off."""
-    dashed = name.replace("_", "-")
-    return f"--{dashed}/--no-{dashed}" if is_switch(field) and field.default else f"--{dashed}"
+    from baker.cli.flags import dashed
+
+    flag = dashed(name)
+    return f"--{flag}/--no-{flag}" if is_switch(field) and field.default else f"--{flag}"
 
 
 def help_of(field: Any) -> str:

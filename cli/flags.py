@@ -19,8 +19,26 @@ _ARGUMENTS = frozenset({
 })  # fmt: skip
 # Arguments whose flag is not `--` followed by their name.
 _SHORT = {"out": "-o"}
+# Settings whose flag has another name. In Python and in job files, `scene` is the scene file.
+_RENAMED = {"scene_name": "scene"}
 # Argument that is converted only if it has a value, because an export has the same name.
 _AMBIGUOUS = "three"
+
+
+def dashed(name: str) -> str:
+    """Return the flag of a setting or argument without its leading dashes.
+
+    Parameters
+    ----------
+    name : str
+        Name of the setting, with underscores.
+
+    Returns
+    -------
+    str
+        Words with dashes between them.
+    """
+    return _RENAMED.get(name, name).replace("_", "-")
 
 
 @cache
@@ -137,6 +155,6 @@ def _is_named(found: re.Match[str]) -> bool:
 
 def _flag(name: str, value: str | None) -> str:
     if value == "False":
-        return "--no-" + name.replace("_", "-")
-    flag = _SHORT.get(name, "--" + name.replace("_", "-"))
+        return f"--no-{dashed(name)}"
+    flag = _SHORT.get(name, f"--{dashed(name)}")
     return flag if value in (None, "True") else f"{flag} {str(value).strip(chr(39))}"

@@ -33,7 +33,7 @@ def inspect(
     from baker.io.inspect import inspect_path
 
     run: Run = ctx.obj
-    found = inspect_path(path, allow_outside=run.of(InspectSettings).allow_outside)
+    found = inspect_path(path, run.of(InspectSettings))
     if run.as_json:
         run.session.write_json(found)
     elif not run.quiet:

@@ -18,6 +18,7 @@ from baker.cli.fields import is_switch, kinds_of, range_of, unit_of
 from baker.comparison.settings import DiffSettings
 from baker.core.settings import BakeSettings
 from baker.core.settings_model import Settings
+from baker.io.settings import LoadSettings
 from baker.jobs.settings import BatchSettings
 from baker.rendering.settings import RenderSettings
 from baker.repairs.settings import RepairSettings
@@ -30,6 +31,7 @@ MODELS: dict[str, type[Settings]] = {
     "BatchKeywords": BatchSettings,
     "CheckKeywords": CheckSettings,
     "DiffKeywords": DiffSettings,
+    "LoadKeywords": LoadSettings,
     "RenderKeywords": RenderSettings,
     "RepairKeywords": RepairSettings,
     "UnwrapKeywords": UnwrapSettings,

@@ -81,6 +81,18 @@ class BakeKeywords(TypedDict, total=False):
     # Metres per unit, for file formats that do not specify their unit.
     scale: float
 
+    # Name or number of the scene in a glTF file; default: the file's default scene.
+    scene_name: str | float | None
+
+    # Material variant of a glTF file; default: the materials without a variant.
+    variant: str | None
+
+    # Colour of textures of base colour, emission and alpha that cannot be read, or `error`.
+    missing_textures: Literal["error", "white", "grey", "magenta"]
+
+    # Unlit materials of glTF: `block` light and reflect none, or `lit` like other materials.
+    unlit: Literal["block", "lit"]
+
     # Also read referenced files outside the scene's folder.
     allow_outside: bool
 
@@ -124,6 +136,10 @@ class AoKeywords(TypedDict, total=False):
     exclude: str | Sequence[str]
     up: Literal["y", "z"]
     scale: float
+    scene_name: str | float | None
+    variant: str | None
+    missing_textures: Literal["error", "white", "grey", "magenta"]
+    unlit: Literal["block", "lit"]
     allow_outside: bool
     seed: int
     threads: int | None
@@ -197,6 +213,31 @@ class DiffKeywords(TypedDict, total=False):
     threads: int | None
 
 
+class LoadKeywords(TypedDict, total=False):
+    """Keywords of `LoadSettings`."""
+
+    # Up axis, for file formats that do not specify one.
+    up: Literal["y", "z"]
+
+    # Metres per unit, for file formats that do not specify their unit.
+    scale: float
+
+    # Name or number of the scene in a glTF file; default: the file's default scene.
+    scene_name: str | float | None
+
+    # Material variant of a glTF file; default: the materials without a variant.
+    variant: str | None
+
+    # Colour of textures of base colour, emission and alpha that cannot be read, or `error`.
+    missing_textures: Literal["error", "white", "grey", "magenta"]
+
+    # Unlit materials of glTF: `block` light and reflect none, or `lit` like other materials.
+    unlit: Literal["block", "lit"]
+
+    # Also read referenced files outside the scene's folder.
+    allow_outside: bool
+
+
 class RenderKeywords(TypedDict, total=False):
     """Keywords of `RenderSettings`."""
 
@@ -245,6 +286,18 @@ class RenderKeywords(TypedDict, total=False):
 
     # Factor of the sky radiance.
     sky_strength: float
+
+    # Name or number of the scene in a glTF file; default: the file's default scene.
+    scene_name: str | float | None
+
+    # Material variant of a glTF file; default: the materials without a variant.
+    variant: str | None
+
+    # Colour of textures of base colour, emission and alpha that cannot be read, or `error`.
+    missing_textures: Literal["error", "white", "grey", "magenta"]
+
+    # Unlit materials of glTF: `block` light and reflect none, or `lit` like other materials.
+    unlit: Literal["block", "lit"]
 
     # Also read referenced files outside the scene's folder.
     allow_outside: bool

@@ -213,6 +213,14 @@ def render(
             Sky radiance R,G,B in cd/m2. Default: black; with `lightmap`, the sky of the bake.
         sky_strength : float, from 0, default 1.0
             Factor of the sky radiance.
+        scene_name : str | float | None, default None
+            Name or number of the scene in a glTF file; default: the file's default scene.
+        variant : str | None, default None
+            Material variant of a glTF file; default: the materials without a variant.
+        missing_textures : Literal["error", "white", "grey", "magenta"], default 'error'
+            Colour of textures of base colour, emission and alpha that cannot be read, or `error`.
+        unlit : Literal["block", "lit"], default 'block'
+            Unlit materials of glTF: `block` light and reflect none, or `lit` like other materials.
         allow_outside : bool, default False
             Also read referenced files outside the scene's folder.
         seed : int, 0 to 2147483647, default 0

@@ -9,32 +9,45 @@ from baker.api.arguments import instance_of, of_the_api, path_of
 from baker.core.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from baker.api.keywords import CheckKeywords, RepairKeywords, UnwrapKeywords
+    from baker.api.keywords import CheckKeywords, LoadKeywords, RepairKeywords, UnwrapKeywords
     from baker.checks.run import CheckReport
     from baker.checks.settings import CheckSettings
     from baker.core.atlas import Atlas
     from baker.core.scene import Scene
     from baker.core.settings import BakeSettings
+    from baker.io.settings import LoadSettings
     from baker.repairs.fix_file import FixResult
     from baker.repairs.settings import RepairSettings
     from baker.uv.settings import UnwrapSettings
 
 
 @of_the_api
-def load(path: str | Path, *, up: str = "y", scale: float = 1.0, allow_outside: bool = False) -> Scene:
+def load(path: str | Path, settings: LoadSettings | None = None, **keywords: Unpack[LoadKeywords]) -> Scene:
     """Read a scene file.
 
     Parameters
     ----------
     path : str or Path
         A scene file, such as .glb or .obj; `baker.io.importers` contains one module for each format.
-    up : str
-        Up axis of formats other than glTF: "y" or "z".
-    scale : float
-        Metres per unit of formats other than glTF.
-    allow_outside : bool
-        Also read referenced files outside the scene's folder, such as "../textures/wood.png". Otherwise such
-        a reference raises an error.
+    settings : LoadSettings, optional
+        Units, scene, pose and variant of the file.
+    **keywords : Unpack[LoadKeywords]
+        Settings by name, which replace those in `settings`:
+
+        up : Literal["y", "z"], default 'y'
+            Up axis, for file formats that do not specify one.
+        scale : float, m, above 0, default 1.0
+            Metres per unit, for file formats that do not specify their unit.
+        scene_name : str | float | None, default None
+            Name or number of the scene in a glTF file; default: the file's default scene.
+        variant : str | None, default None
+            Material variant of a glTF file; default: the materials without a variant.
+        missing_textures : Literal["error", "white", "grey", "magenta"], default 'error'
+            Colour of textures of base colour, emission and alpha that cannot be read, or `error`.
+        unlit : Literal["block", "lit"], default 'block'
+            Unlit materials of glTF: `block` light and reflect none, or `lit` like other materials.
+        allow_outside : bool, default False
+            Also read referenced files outside the scene's folder.
 
     Returns
     -------
@@ -45,6 +58,9 @@ def load(path: str | Path, *, up: str = "y", scale: float = 1.0, allow_outside: 
     ------
     InputError
         If the file is unreadable, malformed, or contains nothing to bake.
+    SettingsError
+        For an unknown setting or a value out of range. If the file has no scene, variant or animation of the
+        given name.
 
     Examples
     --------
@@ -53,9 +69,11 @@ def load(path: str | Path, *, up: str = "y", scale: float = 1.0, allow_outside: 
     >>> len(scene.instances), scene.n_triangles
     (8, 32)
     """
-    from baker.io.load import load_scene
+    from baker.api.settings_of import settings_of
+    from baker.io.load import load_scene_as
+    from baker.io.settings import LoadSettings
 
-    return load_scene(path_of(path, "path", "a scene file"), up=up, scale=scale, allow_outside=allow_outside)
+    return load_scene_as(path_of(path, "path", "a scene file"), settings_of(LoadSettings, settings, keywords))
 
 
 @of_the_api

@@ -108,8 +108,6 @@ LIMITED = {
         "mixed-lighting",
         "subtractive",
         "realtime",
-        "animation",
-        "time",
         "frame",
         "frames",
         "light-groups",

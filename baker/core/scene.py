@@ -73,6 +73,9 @@ class Material:
         Linear: `roughness` is multiplied by green, `metallic` by blue. Bakes do not read it.
     alpha_mode : str
         "OPAQUE", "MASK" or "BLEND".
+    reflects : bool
+        Whether the surface reflects light. If False, its albedo is 0 in a bake; `base_colour` is only the
+        colour in which it is displayed.
     """
 
     name: str = ""
@@ -86,6 +89,7 @@ class Material:
     metallic: float = 1.0
     roughness: float = 1.0
     metallic_roughness_texture: Texture | None = None
+    reflects: bool = True
 
 
 @dataclass(frozen=True)

@@ -113,6 +113,28 @@ class CommonSettings(Settings):
         allow_inf_nan=False,
         group=SCENE,
     )
+    scene_name: Text | None = setting(
+        None,
+        "Name or number of the scene in a glTF file; default: the file's default scene.",
+        group=SCENE,
+        metavar="NAME|N",
+    )
+    variant: str | None = setting(
+        None,
+        "Material variant of a glTF file; default: the materials without a variant.",
+        group=SCENE,
+        metavar="NAME",
+    )
+    missing_textures: Literal["error", "white", "grey", "magenta"] = setting(
+        "error",
+        "Colour of textures of base colour, emission and alpha that cannot be read, or `error`.",
+        group=SCENE,
+    )
+    unlit: Literal["block", "lit"] = setting(
+        "block",
+        "Unlit materials of glTF: `block` light and reflect none, or `lit` like other materials.",
+        group=SCENE,
+    )
     allow_outside: bool = allow_outside_setting()
     seed: int = seed_setting()
     threads: int | None = threads_setting()

@@ -1,4 +1,7 @@
-"""Decodes image files (PNG, JPEG, WebP and others) to RGBA with Pillow."""
+"""Decodes image files (PNG, JPEG, WebP, AVIF, KTX2 and others) to RGBA, most of them with Pillow.
+
+A rotation in EXIF data is ignored, as glTF demands.
+"""
 
 from __future__ import annotations
 
@@ -12,14 +15,17 @@ from numpy.typing import NDArray
 from baker.core.budget import LARGEST_IMAGE_SIDE
 from baker.core.colour import linear_from_srgb
 from baker.core.errors import InputError
+from baker.io.basis import KTX2_HEAD, BasisError, decode_basis, ktx2_size
 from baker.io.png import srgb_levels
 
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF")
+_FORMATS = ("PNG", "JPEG", "WEBP", "AVIF", "BMP", "TGA", "TIFF", "GIF")
 # Largest width and height of an image that is read, texels.
 _LARGEST = 16384
+# Linear RGB of the colours that can replace an image that cannot be read.
+STAND_INS = {"white": (1.0, 1.0, 1.0), "grey": (0.5, 0.5, 0.5), "magenta": (1.0, 0.0, 1.0)}
 # Number of image rows that are converted at a time. It is even, so that each block of 2 x 2 texels lies in
 # one strip.
 _STRIP = 32
@@ -48,17 +54,19 @@ def decode_image(data: bytes, *, file: str, object: str) -> NDArray[np.uint8]:
     InputError
         If the data is not an image that can be decoded, or if its width or height exceeds 16384 texels.
     """
+    if data.startswith(KTX2_HEAD):
+        return _decode_ktx2(data, file, object)
     import PIL.Image
 
+    # A Pillow that was built without AVIF may not know its name.
+    PIL.Image.init()
+    formats = [name for name in _FORMATS if name in PIL.Image.OPEN]
     try:
         with warnings.catch_warnings():
             # Suppress Pillow's warning about large images; the size is checked below.
             warnings.simplefilter("ignore")
-            with PIL.Image.open(io.BytesIO(data), formats=_FORMATS) as image:
-                width, height = image.size
-                if max(width, height) > _LARGEST:
-                    message = f"the image has {width} x {height} texels; at most {_LARGEST} a side are read"
-                    raise InputError(message, file=file, object=object)
+            with PIL.Image.open(io.BytesIO(data), formats=formats) as image:
+                _check_size(*image.size, file, object)
                 return _to_rgba(image)
     except InputError:
         raise
@@ -69,6 +77,40 @@ def decode_image(data: bytes, *, file: str, object: str) -> NDArray[np.uint8]:
         raise InputError(
             f"the image cannot be decoded ({name}); save it again as PNG or JPEG", file=file, object=object
         ) from None
+
+
+def stand_in(colour: str) -> NDArray[np.float32]:
+    """Return an image of one texel that replaces an image that cannot be read.
+
+    Parameters
+    ----------
+    colour : str
+        A key of `STAND_INS`.
+
+    Returns
+    -------
+    (1, 1, 4) float32
+        Linear RGB, and alpha 1.
+    """
+    return np.array([[[*STAND_INS[colour], 1.0]]], np.float32)
+
+
+def _check_size(width: int, height: int, file: str, object: str) -> None:
+    if max(width, height) > _LARGEST:
+        message = f"the image has {width} x {height} texels; at most {_LARGEST} a side are read"
+        raise InputError(message, file=file, object=object)
+
+
+def _decode_ktx2(data: bytes, file: str, object: str) -> NDArray[np.uint8]:
+    """Return the pixels of a KTX2 file; if it has more than 8192 texels a side, halve it."""
+    import PIL.Image
+
+    try:
+        _check_size(*ktx2_size(data), file, object)
+        pixels = decode_basis(data)
+    except BasisError as error:
+        raise InputError(str(error), file=file, object=object) from None
+    return _to_rgba(PIL.Image.fromarray(pixels))
 
 
 def _to_rgba(image: Image) -> NDArray[np.uint8]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,16 +20,19 @@ from baker.io.output_path import not_text
 from baker.io.png import decode_palette_png
 from baker.io.regular_file import read_regular
 
+if TYPE_CHECKING:
+    from baker.io.settings import LoadSettings
 
-def inspect_path(path: Path | str, *, allow_outside: bool = False) -> dict[str, Any]:
+
+def inspect_path(path: Path | str, settings: LoadSettings | None = None) -> dict[str, Any]:
     """Describe a scene file, an output folder (or its bake.json), or an image that baker can read.
 
     Parameters
     ----------
     path : Path or str
         A file or a folder.
-    allow_outside : bool
-        As in `load_scene`.
+    settings : LoadSettings, optional
+        How a scene file is read.
 
     Returns
     -------
@@ -59,9 +62,10 @@ def inspect_path(path: Path | str, *, allow_outside: bool = False) -> dict[str, 
         raise InputError(f"{why}; rename it", file=str(path))
     if encoding is not None:
         return _image(path, encoding.decode(path))
-    from baker.io.load import load_scene
+    from baker.io.load import load_scene_as
+    from baker.io.settings import LoadSettings
 
-    return _scene(path, load_scene(path, allow_outside=allow_outside))
+    return _scene(path, load_scene_as(path, settings or LoadSettings()))
 
 
 def _bake(folder: Path) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from baker.core.error_mapping import memory_errors
 from baker.core.errors import InputError, SettingsError
 from baker.core.light_limits import check_brightness
+from baker.core.read_options import AS_IN_FILE, ReadOptions
 from baker.core.registry import Registry
 from baker.core.scene import Scene
 from baker.io.choose import choose_objects
@@ -23,6 +24,7 @@ from baker.io.scene_folder import SceneFolder
 
 if TYPE_CHECKING:
     from baker.core.settings import BakeSettings
+    from baker.io.settings import LoadSettings
 
 
 @dataclass(frozen=True)
@@ -38,8 +40,8 @@ class SceneFile:
         "y" or "z": the up axis of the file, for formats that do not define an up axis.
     scale : float
         Metres per unit of the file, for formats that do not define a unit.
-    scene_index : int or None
-        Index of the scene in a glTF file; None uses the default scene of the file.
+    options : ReadOptions
+        Scene, variant, pose and treatment of materials.
     reflections : bool
         Also read metallic-roughness textures.
     lenient : bool
@@ -55,7 +57,7 @@ class SceneFile:
     data: bytes
     up: str = "y"
     scale: float = 1.0
-    scene_index: int | None = None
+    options: ReadOptions = AS_IN_FILE
     reflections: bool = False
     lenient: bool = False
     allow_outside: bool = False
@@ -76,7 +78,7 @@ def load_scene(
     *,
     up: str = "y",
     scale: float = 1.0,
-    scene_index: int | None = None,
+    options: ReadOptions = AS_IN_FILE,
     reflections: bool = False,
     lenient: bool = False,
     allow_outside: bool = False,
@@ -92,8 +94,8 @@ def load_scene(
         "y" or "z", the up axis of files whose format does not define an up axis. glTF is always +Y up.
     scale : float
         Metres per unit of files whose format does not define a unit. glTF is always in metres.
-    scene_index : int or None
-        Index of the scene in a glTF file; None uses the default scene of the file.
+    options : ReadOptions
+        Scene, variant, pose and treatment of materials.
     reflections : bool
         Also read metallic-roughness textures, which bakes do not use.
     lenient : bool
@@ -116,7 +118,8 @@ def load_scene(
         If the file or a file that it refers to is missing, unreadable, malformed or outside the folder of the
         scene. If the scene requires an unknown extension, or contains nothing to bake.
     SettingsError
-        If `up` is neither "y" nor "z", or `scale` is not a positive number.
+        If `up` is neither "y" nor "z", or `scale` is not a positive number. If the file has no scene,
+        variant or animation of the given name.
     ResourceError
         If the scene does not fit into memory.
     """
@@ -133,7 +136,7 @@ def load_scene(
         raise InputError("the file is empty; export it again", file=str(path))
     with memory_errors(file=str(path)):
         scene = importer(
-            SceneFile(path, data, up, scale, scene_index, reflections, lenient, allow_outside, self_contained)
+            SceneFile(path, data, up, scale, options, reflections, lenient, allow_outside, self_contained)
         )
     if not lenient:
         check_brightness(scene)
@@ -160,7 +163,7 @@ def load_for_bake(path: Path | str, settings: BakeSettings, *, lenient: bool = F
     path : Path or str
         The scene file.
     settings : BakeSettings
-        `up`, `scale`, `allow_outside`, `include` and `exclude` are used.
+        `up`, `scale`, `allow_outside`, `include`, `exclude` and the members of `ReadOptions` are used.
     lenient : bool
         As in `load_scene`.
 
@@ -178,14 +181,44 @@ def load_for_bake(path: Path | str, settings: BakeSettings, *, lenient: bool = F
     ResourceError
         As in `load_scene`.
     """
-    scene = load_scene(
+    scene = load_scene_as(path, settings, lenient=lenient)
+    return choose_objects(scene, settings.include, settings.exclude)
+
+
+def load_scene_as(path: Path | str, settings: BakeSettings | LoadSettings, *, lenient: bool = False) -> Scene:
+    """Read a scene file as settings say.
+
+    Parameters
+    ----------
+    path : Path or str
+        The scene file.
+    settings : BakeSettings or LoadSettings
+        `up`, `scale`, `allow_outside` and the members of `ReadOptions` are used.
+    lenient : bool
+        As in `load_scene`.
+
+    Returns
+    -------
+    Scene
+        All objects of the scene.
+
+    Raises
+    ------
+    InputError
+        As in `load_scene`.
+    SettingsError
+        As in `load_scene`.
+    ResourceError
+        As in `load_scene`.
+    """
+    return load_scene(
         path,
         up=settings.up,
         scale=settings.scale,
+        options=ReadOptions.of(settings),
         lenient=lenient,
         allow_outside=settings.allow_outside,
     )
-    return choose_objects(scene, settings.include, settings.exclude)
 
 
 def read_scene_file(path: Path) -> bytes:

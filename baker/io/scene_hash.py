@@ -32,7 +32,6 @@ def scene_sha256(path: Path, *, allow_outside: bool = False) -> str:
     ------
     InputError
         If the file is missing, unreadable or malformed, or refers to a file outside the folder of the scene.
-        For an OBJ file, also if an image of a used material is missing.
     """
     folder = SceneFolder(path.parent, allow_outside)
     suffix = path.suffix.lower()

@@ -1,11 +1,30 @@
-"""Defines the settings of `baker inspect`."""
+"""Defines the settings of reading scene files, and of `baker inspect`."""
 
 from __future__ import annotations
 
-from baker.core.settings_model import RunSettings, allow_outside_setting
+from typing import ClassVar, Literal
+
+from baker.core.settings import BakeSettings
+from baker.core.settings_model import RunSettings, Settings, Text, same_setting
 
 
-class InspectSettings(RunSettings):
+class LoadSettings(Settings):
+    """Settings of reading a scene file. Each is the setting of the same name in `BakeSettings`."""
+
+    what: ClassVar[str] = "load setting"
+
+    up: Literal["y", "z"] = same_setting(BakeSettings, "up")
+    scale: float = same_setting(BakeSettings, "scale")
+    scene_name: Text | None = same_setting(BakeSettings, "scene_name")
+    variant: str | None = same_setting(BakeSettings, "variant")
+    missing_textures: Literal["error", "white", "grey", "magenta"] = same_setting(
+        BakeSettings, "missing_textures"
+    )
+    unlit: Literal["block", "lit"] = same_setting(BakeSettings, "unlit")
+    allow_outside: bool = same_setting(BakeSettings, "allow_outside")
+
+
+class InspectSettings(RunSettings, LoadSettings):
     """The settings of `baker inspect`."""
 
-    allow_outside: bool = allow_outside_setting()
+    what: ClassVar[str] = "setting"

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from baker.core.errors import InputError
 from baker.core.progress import Progress, report, silent
+from baker.core.read_options import ReadOptions
 from baker.core.result import Result
 from baker.core.scene import Camera, Scene, SceneWarning
 from baker.core.stage import Stage
@@ -151,7 +152,8 @@ def render(
             warnings += other_scene(baked.bake, Path(scene), allow_outside=settings.allow_outside)
         scene, sky = baked.bake.scene, baked.bake.sky if settings.sky is None else sky
     elif not isinstance(scene, Scene):
-        scene = load_scene(scene, reflections=True, allow_outside=settings.allow_outside)
+        options = ReadOptions.of(settings)
+        scene = load_scene(scene, options=options, reflections=True, allow_outside=settings.allow_outside)
     warnings += [*scene.warnings, *cache_warnings()]
     if text is not None and camera is None:
         camera = named_camera(scene.cameras, text)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from baker.core.errors import SettingsError
 from baker.core.names import unknown_name
@@ -76,6 +76,12 @@ class RenderSettings(Settings):
         metavar="R,G,B",
     )
     sky_strength: float = same_setting(BakeSettings, "sky_strength")
+    scene_name: Text | None = same_setting(BakeSettings, "scene_name")
+    variant: str | None = same_setting(BakeSettings, "variant")
+    missing_textures: Literal["error", "white", "grey", "magenta"] = same_setting(
+        BakeSettings, "missing_textures"
+    )
+    unlit: Literal["block", "lit"] = same_setting(BakeSettings, "unlit")
     allow_outside: bool = same_setting(BakeSettings, "allow_outside")
     seed: int = same_setting(BakeSettings, "seed")
     threads: int | None = same_setting(BakeSettings, "threads")

@@ -47,6 +47,7 @@ def resolve_materials(scene: Scene, geometry: Geometry, *, reflections: bool = F
         return numbers[key]
 
     base = np.array([m.base_colour[:3] for m in scene.materials], np.float64).reshape(-1, 3)
+    base[np.array([not m.reflects for m in scene.materials], bool)] = 0.0
     base_texture = np.array([number(m.base_colour_texture) for m in scene.materials], np.int32)
     emission_texture = np.array([number(m.emission_texture, sharp=True) for m in scene.materials], np.int32)
     glossy = [m.metallic_roughness_texture if reflections else None for m in scene.materials]

@@ -21,7 +21,7 @@ import baker
 from baker.cli.app import run
 from baker.cli.commands import COMMANDS
 from baker.cli.fields import group_of
-from baker.cli.flags import FlagStream
+from baker.cli.flags import FlagStream, dashed
 from baker.cli.report import write_summary
 from baker.core.encoding import encoding_options
 from baker.core.errors import Cancelled, InputError, SettingsError
@@ -122,6 +122,10 @@ OTHER = {
     "exclude": ("UCX_*", ("UCX_*",)),
     "up": ("z", "z"),
     "scale": ("0.01", 0.01),
+    "scene_name": ("1", "1"),
+    "variant": ("red", "red"),
+    "missing_textures": ("grey", "grey"),
+    "unlit": ("lit", "lit"),
     "seed": ("7", 7),
     "threads": ("1", 1),
 } | {name: other_option(model, name) for model in encoding_options().values() for name in model.model_fields}
@@ -131,9 +135,8 @@ def test_every_setting_has_a_flag_that_arrives(pipeline, command, tmp_path):
     assert set(OTHER) == set(BakeSettings.model_fields)
     words = []
     for name, (text, value) in OTHER.items():
-        dashed = name.replace("_", "-")
-        switch = f"--{dashed}" if value else f"--no-{dashed}"
-        words += [switch] if text is None else [f"--{dashed}", text]
+        switch = f"--{dashed(name)}" if value else f"--no-{dashed(name)}"
+        words += [switch] if text is None else [f"--{dashed(name)}", text]
     code, _ = command(*bake_words(tmp_path, *words, "-q"))
     assert code == 0
     settings = pipeline.calls[0].settings
@@ -159,11 +162,15 @@ def test_ao_is_bake_with_one_channel(pipeline, command, tmp_path):
 def test_command_line_wins_over_config(head, pipeline, command, tmp_path):
     config = tmp_path / "bake.toml"
     config.write_text(
-        head + 'resolution = 128\nao-distance = 0.25\nchannels = ["ao"]\ndenoise = false\nsky = [1, 0.5, 0]\n'
+        head
+        + 'scene = "night"\nresolution = 128\nao-distance = 0.25\nchannels = ["ao"]\n'
+        + "denoise = false\nsky = [1, 0.5, 0]\n"
     )
     code, _ = command(*bake_words(tmp_path, "--config", config, "--resolution", "64", "--denoise"))
     assert code == 0
-    expected = BakeSettings(resolution=64, ao_distance="0.25", channels=("ao",), denoise=True, sky="1,0.5,0")
+    expected = BakeSettings(
+        resolution=64, ao_distance="0.25", channels=("ao",), denoise=True, sky="1,0.5,0", scene_name="night"
+    )
     assert pipeline.calls[0].settings == expected
 
 
@@ -335,9 +342,7 @@ def test_inspect_prints_text_and_json(monkeypatch, command):
         "lights": [],
         "warnings": [{"code": "odd", "message": "a sentence that is longer than any hash in a table"}],
     }
-    monkeypatch.setitem(
-        sys.modules, "baker.io.inspect", SimpleNamespace(inspect_path=lambda path, **_: found)
-    )
+    monkeypatch.setitem(sys.modules, "baker.io.inspect", SimpleNamespace(inspect_path=lambda path, _: found))
     code, out = command("inspect", "a.glb", "--threads", "1", "--seed", "2")
     assert code == 0
     assert "triangles: 32\n" in out
@@ -410,7 +415,7 @@ def test_the_common_options_come_first_and_the_others_are_named(command, capsys,
     assert common in complete
     assert short.count("\n") < 40
     for name in BakeSettings.model_fields:
-        assert f"--{name.replace('_', '-')}" in short.split()
+        assert f"--{dashed(name)}" in short.split()
         assert group_of(BakeSettings.model_fields[name])
 
 

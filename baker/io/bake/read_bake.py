@@ -6,7 +6,8 @@ arrays in memory.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from baker.core.atlas import Atlas, InstanceLayout
 from baker.core.encoding import encoding_of
 from baker.core.errors import InputError, SettingsError
+from baker.core.read_options import ReadOptions
 from baker.core.scene import Scene, SceneWarning
 from baker.core.settings import make_settings
 from baker.io.bake.output_folder import AS_BAKED, MANIFEST_NAME, file_state, is_file
@@ -89,8 +91,8 @@ def read_bake(folder: Path | str) -> StoredBake:
         folder = folder.parent
     manifest = read_manifest(folder)
     warnings = tuple(_changed(folder, entry) for entry in manifest["files"] if _differs(folder, entry))
-    scene = load_scene(_present(folder, SCENE_NAME), self_contained=True)
     settings = manifest["settings"]
+    scene = _scene(folder, settings)
     scene = choose_objects(scene, settings.get("include", ()), settings.get("exclude", ()))
     pages, rows = manifest["pages"], {row["node"]: row for row in manifest["instances"]}
     maps = {name: _pages(folder, manifest, name) for name in dict.fromkeys(p["channel"] for p in pages)}
@@ -106,10 +108,26 @@ def read_bake(folder: Path | str) -> StoredBake:
     try:
         bake.sky  # noqa: B018
     except SettingsError as error:
-        why = error.message.replace("`", "")
-        message = f"the manifest is damaged: {why}; bake the scene again"
-        raise InputError(message, file=str(folder / MANIFEST_NAME)) from None
+        raise _damaged(folder, error) from None
     return bake
+
+
+def _scene(folder: Path, settings: Mapping[str, Any]) -> Scene:
+    """Return the scene of a bake; `settings` are those of the manifest."""
+    names = [field.name for field in fields(ReadOptions)]
+    try:
+        known = make_settings({name: settings[name] for name in names if settings.get(name) is not None})
+        options = ReadOptions.of(known)
+        return load_scene(_present(folder, SCENE_NAME), options=options, self_contained=True)
+    except SettingsError as error:
+        raise _damaged(folder, error) from None
+
+
+def _damaged(folder: Path, error: SettingsError) -> InputError:
+    """Return the error for a manifest with an invalid setting."""
+    why = error.message.replace("`", "")
+    message = f"the manifest is damaged: {why}; bake the scene again"
+    return InputError(message, file=str(folder / MANIFEST_NAME))
 
 
 def _present(folder: Path, name: str) -> Path:

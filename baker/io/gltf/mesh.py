@@ -16,7 +16,8 @@ from baker.io.gltf.accessor import FLOAT, component_type, read_accessor, read_in
 from baker.io.gltf.accessor_bytes import fault_of, gather_rows
 from baker.io.gltf.document import GltfDocument
 from baker.io.gltf.json import JsonObject
-from baker.io.gltf.material import MAX_TEXCOORDS, MaterialReader
+from baker.io.gltf.material import MaterialReader
+from baker.io.gltf.texture import MAX_TEXCOORDS
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _DRACO = "KHR_draco_mesh_compression"
@@ -121,10 +122,7 @@ def _primitive(
             attributes.fail(f"the accessor has {len(value)} rows, POSITION has {len(position)}", key)
         return value
 
-    n_materials = len(document.root.children("materials"))
-    material = (
-        primitive.index("material", n_materials, "materials") if "material" in primitive else n_materials
-    )
+    material = materials.index_of(primitive)
     read = materials.need(material)
     textures = (read.base_colour_texture, read.emission_texture)
     needed = {texture.texcoord for texture in textures if texture is not None}

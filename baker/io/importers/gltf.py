@@ -16,6 +16,7 @@ from baker.core.errors import InputError
 from baker.core.scene import Instance, Mesh, PunctualLight, Scene, SceneWarning, SourceDocument
 from baker.core.source_mesh import SourceInstance, SourceMesh, SourceScene
 from baker.io.gltf.camera import read_cameras
+from baker.io.gltf.choose_scene import choose_scene
 from baker.io.gltf.document import GltfDocument, open_document
 from baker.io.gltf.extension import expand_document
 from baker.io.gltf.instancing import refuse_broken
@@ -23,7 +24,7 @@ from baker.io.gltf.json import JsonObject
 from baker.io.gltf.light import read_light
 from baker.io.gltf.material import MaterialReader
 from baker.io.gltf.mesh import read_primitives
-from baker.io.gltf.node import Placed, place_nodes
+from baker.io.gltf.node import Placed
 from baker.io.gltf.skin import Poser
 from baker.io.gltf.unread import unneeded_faults
 from baker.io.load import IMPORTERS, SceneFile
@@ -77,12 +78,12 @@ def import_gltf(source: SceneFile) -> Scene:
     if source.up != "y" or source.scale != 1.0:
         message = "up axis and scale are not applied: glTF is +Y up and in metres"
         warnings.append(SceneWarning("up-and-scale-ignored", message))
-    number, placed = _choose_scene(document, source.scene_index, warnings, lenient=source.lenient)
-    reader = MaterialReader(document, reflections=source.reflections)
+    number, placed = choose_scene(document, source.options.scene_name, warnings, lenient=source.lenient)
+    reader = MaterialReader(document, source.options, reflections=source.reflections)
     meshes, instances, source_scene = _instances(document, placed, reader, warnings, lenient=source.lenient)
     lights = _lights(placed, document, warnings, lenient=source.lenient)
     cameras = read_cameras(placed, document, warnings)
-    warnings += [*reader.warnings, *unneeded_faults(document, reader.reported)]
+    warnings += [*reader.warnings, *reader.notes(), *unneeded_faults(document, reader.reported)]
     if not instances and not source.lenient:
         where = f"scenes[{number}]" if number is not None else None
         detail = "; ".join(f"{w.object}: {w.message}" if w.object else w.message for w in warnings[:3])
@@ -112,27 +113,6 @@ def import_gltf(source: SceneFile) -> Scene:
         cameras=tuple(cameras),
         source_scene=source_scene,
     )
-
-
-def _choose_scene(
-    document: GltfDocument, asked: int | None, warnings: list[SceneWarning], *, lenient: bool
-) -> tuple[int | None, list[Placed]]:
-    """Return the index of the chosen scene (None if the file has no scenes), and the scene's nodes."""
-    root = document.root
-    scenes, nodes = root.children("scenes"), root.children("nodes")
-    if asked is not None and not 0 <= asked < len(scenes):
-        raise InputError(f"there is no scene {asked}: the file has {len(scenes)} scenes", file=root.file)
-    if not scenes:
-        inside = {k for node in nodes for k in node.indices("children", len(nodes), "nodes")}
-        return None, place_nodes(nodes, [k for k in range(len(nodes)) if k not in inside])
-    number = asked if asked is not None else root.index("scene", len(scenes), "scenes", 0)
-    if len(scenes) > 1 and asked is None:
-        message = f"the file has {len(scenes)} scenes; scene {number} is taken"
-        warnings.append(SceneWarning("several-scenes", message, scenes[number].string("name", "")))
-    roots = scenes[number].indices("nodes", len(nodes), "nodes")
-    if not roots and not lenient:
-        scenes[number].fail("there is nothing to bake: the scene has no nodes")
-    return number, place_nodes(nodes, roots)
 
 
 def _instances(

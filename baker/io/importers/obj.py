@@ -45,14 +45,16 @@ def import_obj(source: SceneFile) -> Scene:
     Raises
     ------
     InputError
-        If the file cannot be parsed, an index is out of range, an image of a used material is missing, or no
-        triangle is left.
+        If the file cannot be parsed, an index is out of range, or no triangle is left. If an image of a used
+        material is missing and `missing_textures` is "error".
     """
     file = str(source.path)
     digest = hashlib.sha256(source.data)
     warnings: list[SceneWarning] = []
     text = _decode(source.data)
-    materials = _read_libraries(text, source.path, source.folder, digest, warnings)
+    colour = source.options.missing_textures
+    missing = None if colour == "error" else (colour, warnings)
+    materials = _read_libraries(text, source.path, source.folder, digest, warnings, missing=missing)
     reader = _parse(text, materials, file)
     attributes = reader.GetAttrib()
     position = np.array(attributes.vertices, np.float64).reshape(-1, 3)
@@ -95,11 +97,14 @@ def obj_sha256(path: Path, data: bytes, folder: SceneFolder) -> str:
     Raises
     ------
     InputError
-        If a material library is malformed or an image is missing.
+        If a material library is malformed.
     """
     digest = hashlib.sha256(data)
     nothing = np.zeros((1, 1, 4), np.uint8)
-    _read_libraries(_decode(data), path, folder, digest, [], lambda content, **where: nothing)
+    missing: tuple[str, list[SceneWarning]] = ("white", [])
+    _read_libraries(
+        _decode(data), path, folder, digest, [], missing=missing, decode=lambda content, **where: nothing
+    )
     return digest.hexdigest()
 
 
@@ -116,6 +121,8 @@ def _read_libraries(
     folder: SceneFolder,
     digest: hashlib._Hash,
     warnings: list[SceneWarning],
+    *,
+    missing: tuple[str, list[SceneWarning]] | None,
     decode: Callable[..., NDArray[np.uint8]] = decode_image,
 ) -> list[Material]:
     """Return the materials of all MTL files; add the bytes of the MTL files and images to `digest`."""
@@ -150,6 +157,7 @@ def _read_libraries(
                 folder=file.parent,
                 read_file=read_file,
                 used=used,
+                missing=missing,
                 decode=decode,
             )
     return materials

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.errors import InputError
-from baker.core.scene import Material, Texture
-from baker.io.images import decode_image
+from baker.core.scene import Material, SceneWarning, Texture
+from baker.io.images import decode_image, stand_in
 from baker.io.scene_folder import OutsideError, OutsideName
 
 # Option of a map statement -> number of words after it that belong to the option.
@@ -43,6 +43,7 @@ def read_mtl(
     folder: Path,
     read_file: Callable[[str, Path], bytes],
     used: Container[str],
+    missing: tuple[str, list[SceneWarning]] | None = None,
     decode: Callable[..., NDArray[np.uint8]] = decode_image,
 ) -> list[Material]:
     """Read the materials of a library.
@@ -60,6 +61,9 @@ def read_mtl(
         OutsideName if the file cannot be read.
     used : container of str
         Names of the materials that faces use. Errors in other materials are ignored, except `OutsideError`.
+    missing : (str, list of SceneWarning), optional
+        Colour of images that cannot be read (see `stand_in`), and the list that gets a warning for each.
+        None raises an error.
     decode : callable
         Decodes the content of an image file; see `decode_image`.
 
@@ -71,8 +75,8 @@ def read_mtl(
     Raises
     ------
     InputError
-        For a value that is not a number, or an image that is missing, cannot be decoded, or is outside the
-        folder of the scene.
+        For a value that is not a number, or an image that is outside the folder of the scene. Without
+        `missing`, also for an image that is missing or cannot be decoded.
     """
     images = _Images(file, folder, read_file, decode)
 
@@ -80,7 +84,15 @@ def read_mtl(
         if not words:
             return None
         names, transform, clamp = _map_options(words, file, material)
-        pixels = images.find(material, words, names)
+        try:
+            pixels = images.find(material, words, names)
+        except InputError as error:
+            if missing is None or isinstance(error, OutsideError) or material not in used:
+                raise
+            colour, warnings = missing
+            message = f"{error.message}; {colour} replaces it"
+            warnings.append(SceneWarning("missing-texture", message, material))
+            return Texture(stand_in(colour))
         return Texture(pixels, 0, transform, ("clamp", "clamp") if clamp else ("repeat", "repeat"))
 
     out = []

@@ -1,4 +1,4 @@
-"""Describes EXT_texture_webp, which `baker.io.gltf.material` reads."""
+"""Describes EXT_texture_webp, which `baker.io.gltf.texture` reads."""
 
 from __future__ import annotations
 

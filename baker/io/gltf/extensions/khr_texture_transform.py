@@ -1,4 +1,4 @@
-"""Describes KHR_texture_transform, which `baker.io.gltf.material` reads."""
+"""Describes KHR_texture_transform, which `baker.io.gltf.texture` reads."""
 
 from __future__ import annotations
 

@@ -7,6 +7,6 @@ from baker.io.gltf.extension import EXTENSIONS, GltfExtension
 EXTENSIONS.register("KHR_materials_unlit")(
     GltfExtension(
         read="all",
-        used="the material emits nothing",
+        used="the material blocks light; it reflects light only if the setting `unlit` is lit",
     )
 )

@@ -14,7 +14,6 @@ register_all(
         "KHR_materials_iridescence",
         "KHR_materials_sheen",
         "KHR_materials_specular",
-        "KHR_materials_variants",
         "KHR_xmp_json_ld",
     ),
     GltfExtension(read="nothing", used="nothing"),

@@ -8,14 +8,20 @@ import math
 
 import numpy as np
 import pytest
+from glb_reader import Glb
 from gltf_builder import quad_builder, write
+from io_scenes import make_atlas, split_layout
 from PIL import Image
 
 from baker.core.colour import linear_from_srgb
-from baker.core.errors import InputError
-from baker.io.gltf.material import texture_transform
+from baker.core.errors import InputError, SettingsError
+from baker.core.geometry import world_geometry
+from baker.core.read_options import ReadOptions
+from baker.io.gltf.texture import texture_transform
+from baker.io.gltf.write_baked import make_glb
 from baker.io.images import decode_image
 from baker.io.load import load_scene
+from baker.shading.materials import resolve_materials
 
 
 def encode(pixels, kind="PNG", **options):
@@ -59,19 +65,62 @@ def test_factors_strength_and_sides(tmp_path):
     assert (material.alpha_mode, material.alpha_cutoff, material.metallic) == ("MASK", 0.25, 0.5)
 
 
-def test_unlit_reflects_its_base_colour_and_emits_nothing(tmp_path):
-    material = material_of(
-        tmp_path,
-        quad_builder(
-            pbrMetallicRoughness={"baseColorFactor": [0.5, 0.25, 0, 1]},
-            emissiveFactor=[1, 1, 1],
-            extensions={"KHR_materials_unlit": {}},
-        ),
+def test_unlit_emits_nothing_and_reflects_only_if_asked(tmp_path):
+    builder = quad_builder(
+        name="sign",
+        pbrMetallicRoughness={"baseColorFactor": [0.5, 0.25, 0, 1], "baseColorTexture": {"index": 0}},
+        emissiveFactor=[1, 1, 1],
+        extensions={"KHR_materials_unlit": {}},
     )
+    builder.json["images"], builder.json["textures"] = [{"uri": "gone.png"}], [{"source": 0}]
+    path = write(tmp_path / "a.glb", builder)
+    scene = load_scene(path)
+    material = scene.materials[0]
     assert material.base_colour[:3] == (0.5, 0.25, 0)
     assert material.emission == (0, 0, 0)
+    assert [w.object for w in scene.warnings if w.code == "unlit"] == ["sign"]
+    geometry = world_geometry(scene, make_atlas(split_layout(scene, 0)))
+    np.testing.assert_array_equal(resolve_materials(scene, geometry).base, [[0, 0, 0]])
+    # A black surface does not need its picture.
+    assert {w.code for w in scene.warnings} == {"unlit", "missing-texture"}
+    with pytest.raises(InputError, match=r"gone\.png"):
+        load_scene(path, options=ReadOptions(unlit="lit"))
+    lit = load_scene(path, options=ReadOptions(unlit="lit", missing_textures="white"))
+    np.testing.assert_array_equal(resolve_materials(lit, geometry).base, np.float32([[0.5, 0.25, 0]]))
+    assert "unlit" not in {w.code for w in lit.warnings}
 
 
+def test_a_variant_chooses_materials_and_all_variants_stay(tmp_path):
+    builder = quad_builder(name="plain", pbrMetallicRoughness={"baseColorFactor": [1, 0, 0, 1]})
+    blue = builder.add(
+        "materials", {"name": "blue", "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 1, 1]}}
+    )
+    builder.json["extensions"] = {
+        VARIANTS: {"variants": [{"name": "day"}, {"name": "night"}, {"name": "fog"}]}
+    }
+    builder.json["extensionsUsed"] = [VARIANTS]
+    mappings = [{"material": blue, "variants": [1, 2]}]
+    builder.json["meshes"][0]["primitives"][0]["extensions"] = {VARIANTS: {"mappings": mappings}}
+    path = write(tmp_path / "a.glb", builder)
+
+    def colour(variant):
+        scene = load_scene(path, options=ReadOptions(variant=variant))
+        return scene.materials[scene.meshes[0].material[0]].base_colour[:3]
+
+    assert [colour(v) for v in (None, "day", "night", "fog")] == [(1, 0, 0)] * 2 + [(0, 0, 1)] * 2
+    with pytest.raises(SettingsError, match="no variant 'nigt'; did you mean 'night'"):
+        colour("nigt")
+    scene = load_scene(path, options=ReadOptions(variant="night"))
+    document = Glb(make_glb(scene, make_atlas(split_layout(scene, 0))).data).json
+    assert document["extensions"] == builder.json["extensions"]
+    assert document["meshes"][0]["primitives"][0]["extensions"] == {VARIANTS: {"mappings": mappings}}
+    del builder.json["extensions"]
+    write(path, builder)
+    with pytest.raises(SettingsError, match="the file has no material variants"):
+        colour("day")
+
+
+VARIANTS = "KHR_materials_variants"
 GLOSSY = "KHR_materials_pbrSpecularGlossiness"
 
 

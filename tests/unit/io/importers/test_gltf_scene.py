@@ -10,6 +10,7 @@ import pytest
 from gltf_builder import QUAD, QUAD_NORMAL, QUAD_TRIANGLE, quad_builder, write
 
 from baker.core.errors import InputError, SettingsError
+from baker.core.read_options import ReadOptions
 from baker.io.load import IMPORTERS, load_scene
 
 
@@ -83,11 +84,17 @@ def test_scenes_are_chosen_by_default_or_by_number(tmp_path):
     scene = load(tmp_path, builder)
     assert [(i.name, i.mesh) for i in scene.instances] == [("other", 0)]
     assert len(scene.meshes) == 1
-    scene = load(tmp_path, builder, scene_index=0)
-    assert [i.name for i in scene.instances] == ["place"]
-    assert codes(scene) == []
-    with pytest.raises(InputError, match="no scene 2"):
-        load(tmp_path, builder, scene_index=2)
+    for asked, name in (("0", "place"), ("1", "other"), ("second", "other")):
+        scene = load(tmp_path, builder, options=ReadOptions(scene_name=asked))
+        assert [i.name for i in scene.instances] == [name]
+        assert codes(scene) == []
+        assert scene.source.json["scene"] == (name == "other")
+    for asked, hint in (("2", "known are 0, second"), ("sceond", "did you mean 'second'")):
+        with pytest.raises(SettingsError, match=f"no scene '{asked}'.*{hint}"):
+            load(tmp_path, builder, options=ReadOptions(scene_name=asked))
+    # The name of a scene precedes a number.
+    builder.json["scenes"][0]["name"] = "1"
+    assert load(tmp_path, builder, options=ReadOptions(scene_name="1")).instances[0].name == "place"
 
 
 def test_a_file_without_scenes_shows_all_its_roots(tmp_path):

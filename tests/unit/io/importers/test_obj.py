@@ -9,7 +9,9 @@ import pytest
 from PIL import Image
 
 from baker.core.errors import InputError
+from baker.core.read_options import ReadOptions
 from baker.io.load import load_scene
+from baker.io.scene_hash import scene_sha256
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
@@ -202,3 +204,18 @@ def test_bad_libraries_are_refused_in_a_sentence(tmp_path, mtl, words):
         load(tmp_path, "mtllib m.mtl\nusemtl a\n" + SQUARE + "f 1 2 3\n")
     for word in words:
         assert word.lower() in str(caught.value).lower()
+
+
+@pytest.mark.parametrize("image", [None, b"no image"])
+def test_a_colour_replaces_a_missing_picture(tmp_path, image):
+    if image is not None:
+        (tmp_path / "gone.png").write_bytes(image)
+    (tmp_path / "m.mtl").write_text("newmtl a\nKd 0.5 0.25 1\nmap_Kd gone.png\n")
+    text = "mtllib m.mtl\nusemtl a\n" + SQUARE + "f 1 2 3\n"
+    with pytest.raises(InputError, match=r"gone\.png|decoded"):
+        load(tmp_path, text)
+    scene = load(tmp_path, text, options=ReadOptions(missing_textures="grey"))
+    np.testing.assert_array_equal(scene.materials[0].base_colour_texture.image, [[[0.5, 0.5, 0.5, 1]]])
+    assert scene.materials[0].base_colour == (0.5, 0.25, 1, 1)
+    assert [w.object for w in scene.warnings if w.code == "missing-texture"] == ["a"]
+    assert scene.sha256 == scene_sha256(tmp_path / "a.obj")
