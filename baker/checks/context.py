@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import cached_property
 from itertools import product
 
@@ -93,11 +94,9 @@ class CheckContext:
 
     @cached_property
     def node_named(self) -> dict[str, int]:
-        """Return the node of the first instance with each name, by name."""
-        found: dict[str, int] = {}
-        for instance in self.source.instances:
-            found.setdefault(instance.name, instance.node)
-        return found
+        """Return the node of each name that only one instance has, by name."""
+        count = Counter(instance.name for instance in self.source.instances)
+        return {i.name: i.node for i in self.source.instances if count[i.name] == 1}
 
     @cached_property
     def test_points(self) -> SortedPoints:

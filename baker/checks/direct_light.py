@@ -40,12 +40,15 @@ class Levels:
     position : (n, 3) float64, metres, world, relative to `Scene.origin`
     irradiance : (n,) float64, lx
         The largest of the components R, G and B at each point.
+    from_lights : (n,) float64, lx
+        The same, but only of the lights without area.
     triangle : (n,) int64
         Index in `WorldTriangles` of the triangle on which each point lies.
     """
 
     position: NDArray[np.float64]
     irradiance: NDArray[np.float64]
+    from_lights: NDArray[np.float64]
     triangle: NDArray[np.int64]
 
 
@@ -77,6 +80,7 @@ def estimate_levels(
     for light in scene.local_lights:
         if max(light.intensity) > 0:
             total += _punctual(world, light, origin, normal)
+    from_lights = total.max(axis=1)
     total += _emissive(world, emission, origin, normal, random)
     sky = np.array(settings.sky_radiance)
     if sky.any():
@@ -86,7 +90,7 @@ def estimate_levels(
             np.repeat(origin, SKY_RAYS, axis=0), direction, np.zeros(len(direction)), far
         )
         total += np.pi * (hit < 0).reshape(-1, SKY_RAYS).mean(axis=1)[:, None] * sky
-    return Levels(position, total.max(axis=1), triangle)
+    return Levels(position, total.max(axis=1), from_lights, triangle)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import Any
 from baker.checks.bake_rates import rates_beside, rates_of
 from baker.checks.context import CheckContext
 from baker.checks.finding import SEVERITIES, Finding, Location, RawFinding, finding_json
-from baker.checks.ignore import Ignore, parse_ignore
+from baker.checks.ignore import Ignore, ignored_by_nodes, parse_ignore
 from baker.checks.rule import CHECKS, all_checks, run_check
 from baker.checks.settings import CheckSettings, with_extras
 from baker.core.errors import IndexRangeError
@@ -113,6 +113,7 @@ def check_scene(
     start = time.perf_counter()
     path = (scene.path or Path("scene")) if isinstance(scene, Scene) else Path(scene)
     parse_ignore(settings.ignore)
+    by_nodes: list[Ignore] = []
     timings: dict[str, float] = {}
     try:
         if not isinstance(scene, Scene):
@@ -121,10 +122,10 @@ def check_scene(
         found = [_index_range(error)]
     else:
         timings[Stage.LOAD] = time.perf_counter() - start
-        settings = with_extras(settings, scene)
+        settings, by_nodes = with_extras(settings, scene), ignored_by_nodes(scene)
         found = _run(path, scene, settings, bake_settings, progress, timings)
     found.sort(key=lambda finding: (-finding.rank, finding.code, finding.object))
-    ignore = parse_ignore(settings.ignore)
+    ignore = parse_ignore(settings.ignore) + by_nodes
     counted = tuple(finding for finding in found if not _ignored(ignore, finding))
     ignored = tuple(finding for finding in found if _ignored(ignore, finding))
     limit = settings.fail_on or "error"
@@ -159,4 +160,4 @@ def _index_range(error: IndexRangeError) -> Finding:
 
 
 def _ignored(ignore: list[Ignore], finding: Finding) -> bool:
-    return any(rule.matches(finding.code, finding.object) for rule in ignore)
+    return any(rule.matches(finding.code, finding.object, finding.node) for rule in ignore)

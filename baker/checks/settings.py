@@ -49,12 +49,10 @@ class CheckSettings(Settings):
 
 
 def with_extras(settings: CheckSettings, scene: Scene) -> CheckSettings:
-    """Add the settings in the scene's `extras.baker.check` to settings of a check.
+    """Add the settings in `extras.baker.check` of the document to settings of a check.
 
-    The extras of the document may have `ignore` and `fail_on`. `fail_on` is used only if `settings` has none.
-    The extras of a node with a mesh may have `ignore`: a code, a list of codes, or true for all codes. These
-    codes are ignored for all objects with the name of the node. The extras of nodes are read only if the
-    scene was loaded with `lenient=True`.
+    These may be `fail_on`, which is used if `settings` has none, and `ignore`. `ignored_by_nodes` reads the
+    extras of nodes.
 
     Parameters
     ----------
@@ -75,29 +73,17 @@ def with_extras(settings: CheckSettings, scene: Scene) -> CheckSettings:
     """
     if scene.source is None:
         return settings
-    document = scene.source.json
-    own = _table(document)
-    rules = list(settings.ignore)
+    own = check_extras(scene.source.json)
     found = CheckSettings.make(
         {key: value for key, value in own.items() if key in ("fail_on", "fail-on", "ignore")},
         file=f"{scene.path}: extras.baker.check",
     )
-    rules += found.ignore
-    nodes = document.get("nodes", [])
-    for instance in scene.source_scene.instances if scene.source_scene is not None else ():
-        table = _table(nodes[instance.node]) if instance.node < len(nodes) else {}
-        codes = table.get("ignore", [])
-        codes = ["*"] if codes is True else [codes] if isinstance(codes, str) else codes
-        rules += [f"{code}@{_literal(instance.name)}" for code in codes if isinstance(code, str)]
-    return settings.changed(ignore=tuple(rules), fail_on=settings.fail_on or found.fail_on)
+    rules = (*settings.ignore, *found.ignore)
+    return settings.changed(ignore=rules, fail_on=settings.fail_on or found.fail_on)
 
 
-def _table(holder: Any) -> dict[str, Any]:
+def check_extras(holder: Any) -> dict[str, Any]:
     """Return `extras.baker.check` of a glTF object, an empty dictionary if it is missing."""
     for key in ("extras", "baker", "check"):
         holder = holder.get(key) if isinstance(holder, dict) else None
     return holder if isinstance(holder, dict) else {}
-
-
-def _literal(name: str) -> str:
-    return "".join(f"[{c}]" if c in "*?[" else c for c in name)

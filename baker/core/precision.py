@@ -82,7 +82,7 @@ def coarse_objects(scene: Scene, texel: NDArray[np.float64]) -> CoarseObjects | 
     )
     if stored[worst] == spacing[worst]:
         largest = float(extents[scene.instances[worst].mesh][1].max())
-        text = f"its vertices are stored with coordinates of up to {largest:.3g}, {ends}"
+        text = f"90 % of its vertices are stored with coordinates of up to {largest:.3g}, {ends}"
         fix = "move the distance into the node's translation, so that the mesh lies around its own origin"
     else:
         text = f"it lies {_metres(distance[worst])} from the origin among the other objects, {ends}"

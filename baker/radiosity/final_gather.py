@@ -7,7 +7,7 @@ texels are the entries stored in the page; the backs of double-sided surfaces ar
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,8 +45,8 @@ class Gathered:
     variance : (n_front,) float32, lx2
         Variance of (R + G + B) / 3 of indirect + direct.
     rays : int
-        Number of gather rays: `n_front` times the rays per texel. The second pass of rays that hit `BLEND`
-        surfaces is not counted.
+        Number of gather rays. Rays that are cast a second time, because a `BLEND` surface stopped a ray of
+        their packet, count twice.
     """
 
     indirect: NDArray[np.float32]
@@ -56,11 +56,11 @@ class Gathered:
     rays: int
 
     @classmethod
-    def zeros(cls, n_front: int, rays_per_texel: int) -> Gathered:
+    def zeros(cls, n_front: int) -> Gathered:
         """Return zeros for `n_front` texels."""
         indirect, direct = np.zeros((n_front, 3), np.float32), np.zeros((n_front, 3), np.float32)
         opened, variance = np.zeros(n_front, np.float32), np.zeros(n_front, np.float32)
-        return cls(indirect, direct, opened, variance, n_front * rays_per_texel)
+        return cls(indirect, direct, opened, variance, 0)
 
 
 def final_gather(
@@ -98,8 +98,8 @@ def final_gather(
     Gathered
         Light and ambient occlusion of the front texels.
     """
-    gathered = Gathered.zeros(n_front, sampling.n_gather)
-    n_rays = sampling.n_gather
+    gathered, n_rays = Gathered.zeros(n_front), sampling.n_gather
+    cast = np.zeros(-(-n_front // TILE), np.int64)
     sobol_points, shared = sobol_reversed(n_rays, job.seed, 6), shared_bits_mask(n_rays)
     limits, radiance = np.array([ao_distance, sampling.n_light], np.float64), np.array(sky, np.float32)
     shading, chooser = sampling.needed_shading(), sampling.chooser(job.chart)
@@ -110,21 +110,23 @@ def final_gather(
         whole = min(begin + TILE, job.n)
         origin, normal = job.tile_points(begin, whole)
         buffers, out = job.packet_buffers(), np.zeros((end - begin, N_COLUMNS), np.float32)
+        n_cast = 0
         for choice, part in _fronts(chooser.choose(begin, origin, normal, buffers), end - begin):
-            gather(
+            n_cast += gather(
                 origin[part], normal[part], job.lookup, seen, choice.found, shading, buffers,
                 begin + part.start, sobol_points, shared, radiance, limits, analytic[begin:end][part],
                 out[part],
             )  # fmt: skip
         spread = batch_variance(out[:, INDIRECT : DIRECT + 3].sum(axis=1), out[:, SQUARE])
-        return out[:, INDIRECT : INDIRECT + 3], out[:, DIRECT : DIRECT + 3], out[:, OPEN], spread
+        return out[:, INDIRECT : INDIRECT + 3], out[:, DIRECT : DIRECT + 3], out[:, OPEN], spread, n_cast
 
     def keep(begin: int, end: int, part: Part) -> None:
         gathered.indirect[begin:end], gathered.direct[begin:end] = part[:2]
-        gathered.open[begin:end], gathered.variance[begin:end] = part[2:]
+        gathered.open[begin:end], gathered.variance[begin:end] = part[2:4]
+        cast[begin // TILE] = part[4]
 
     job.run(Stage.FINAL_GATHER, n_front, TILE, work, keep, rays_per_item=n_rays)
-    return gathered
+    return replace(gathered, rays=int(cast.sum()))
 
 
 def _fronts(choices: list[Choice], m: int) -> Iterator[tuple[Choice, slice]]:

@@ -46,6 +46,8 @@ from baker.trace.packets import PacketBuffers
 # Items per tile: texels that are tested (_TILE), texels whose points are grouped (_SUSPECTS), pairs of
 # neighbouring entries (_PAIRS).
 _TILE = 4096
+# Number of rays that `crossed_texels` casts from a texel that nothing crosses, which are most texels.
+_MOST_RAYS = 8
 _SUSPECTS, _PAIRS = 1024, 2048
 # The first visibility test of two neighbouring entries uses only point 0 of each entry. The second test uses
 # all points.
@@ -184,7 +186,7 @@ def split_texels(texels: TexelBuffer, job: TraceJob) -> Sides:
         buffers = job.occlusion_buffers(solid=True)
         cast[begin // _TILE] = crossed_texels(surface, begin, end, buffers, crossed, side)
 
-    job.run_here(Stage.TEXEL_SIDES, n, _TILE, find_crossed, rays_per_item=4)
+    job.run_here(Stage.TEXEL_SIDES, n, _TILE, find_crossed, rays_per_item=_MOST_RAYS)
     suspect = np.flatnonzero(crossed)
     groups, rays = _group(job, suspect[valid[suspect] != 0], side)
     rays += int(cast.sum())

@@ -56,8 +56,7 @@ def border_texels(owner: NDArray[np.int32], covered: NDArray[np.bool_]) -> NDArr
     """Return (P, H, W) bool: the border texels of charts.
 
     These are covered texels with a neighbour that is not covered or lies on another object. An uncovered
-    texel with surface is a border texel if the highest object index of its covered neighbours is the index of
-    its own object.
+    texel with surface is a border texel if a covered neighbour lies on its own object.
 
     Parameters
     ----------
@@ -72,9 +71,18 @@ def border_texels(owner: NDArray[np.int32], covered: NDArray[np.bool_]) -> NDArr
         high = maximum_filter(own[page], 3, mode="nearest")
         low = minimum_filter(own[page], 3, mode="nearest")
         outermost = covered[page] & (low != high)
-        beyond = ~covered[page] & (high == owner[page])
-        result[page] = (owner[page] >= 0) & (outermost | beyond)
+        result[page] = outermost | (~covered[page] & _beside_own(owner[page], own[page]))
     return result
+
+
+def _beside_own(owner: NDArray[np.int32], own: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Return (H, W) bool: texels on an object with a neighbour in `own` (-1: none) on the same object."""
+    height, width = owner.shape
+    padded = np.pad(own, 1, constant_values=-1)
+    near = np.zeros(owner.shape, bool)
+    for y, x in np.ndindex(3, 3):
+        near |= padded[y : y + height, x : x + width] == owner
+    return near & (owner >= 0)
 
 
 def edge_points(

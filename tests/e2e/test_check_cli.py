@@ -116,6 +116,24 @@ def test_extras_of_the_scene(tmp_path, where):
     assert check(write(tmp_path / "extras.glb", builder))[0] == 0
 
 
+def test_extras_of_a_node_do_not_hide_findings_about_other_nodes_of_its_name(tmp_path):
+    builder = GltfBuilder()
+    triangle = np.uint16([[0, 1, 2], [0, 2, 3]])
+    uv = np.zeros((4, 2), np.float32)
+    for shift in (0, 2):
+        flawed = builder.primitive(QUAD + np.float32([shift, 0, 0]), triangle, TEXCOORD_1=uv)
+        builder.node(mesh=builder.mesh(flawed), name="twin [1]")
+    path = write(tmp_path / "twins.glb", builder)
+
+    def nodes():
+        return [f["node"] for f in check(path)[1]["findings"] if f["code"] == "uv.degenerate"]
+
+    assert nodes() == [0, 1]
+    builder.json["nodes"][1]["extras"] = {"baker": {"check": {"ignore": True}}}
+    write(path, builder)
+    assert nodes() == [0]
+
+
 def test_extras_can_set_the_limit_and_the_command_line_wins(tmp_path):
     builder = quad_builder()
     builder.json["extras"] = {"baker": {"check": {"fail_on": "warning"}}}

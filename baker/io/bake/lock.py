@@ -39,6 +39,15 @@ class OutputLock:
         OSError
             If the lock file or its folder cannot be created, or if the file system does not support locks.
         """
+        try:
+            self._file = self._lock()
+        finally:
+            if self._file is None:
+                self._remove_made()
+        return self._file is not None
+
+    def _lock(self) -> int | None:
+        """Return the descriptor of the locked file, or None if another run holds or has just released it."""
         for parent in reversed([p for p in self.path.parents if not p.exists()]):
             with contextlib.suppress(FileExistsError):
                 parent.mkdir()
@@ -46,17 +55,18 @@ class OutputLock:
         try:
             file = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o644)
         except FileNotFoundError:
-            return False  # another run has just removed a parent folder
+            return None  # another run has just removed a parent folder
         try:
             if try_lock(file) and is_at(file, self.path):
-                self._file = file
-                return True
+                return file
         except OSError:
             os.close(file)
+            # Without locks, no other run can hold the file.
+            self.path.unlink(missing_ok=True)
             raise
         # Another run holds the lock, or it deleted the lock file between `os.open` and `try_lock`.
         os.close(file)
-        return False
+        return None
 
     def release(self) -> None:
         """Release the lock. Delete the lock file, and the empty parent folders that `acquire` created."""
@@ -67,6 +77,10 @@ class OutputLock:
             self.path.unlink()
         os.close(self._file)
         self._file = None
+        self._remove_made()
+
+    def _remove_made(self) -> None:
+        """Delete the parent folders that this lock created, as far as they are empty."""
         while self._made:
             try:
                 self._made.pop().rmdir()

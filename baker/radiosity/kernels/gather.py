@@ -67,7 +67,7 @@ def gather(
     origin, normal, lookup, seen, emitters, shading, buffers, begin, sobol_points, shared, sky, limits,
     analytic, out,
 ):  # fmt: skip
-    """Write the irradiance and ambient occlusion of m texels, estimated with hemisphere rays.
+    """Write irradiance and ambient occlusion of m texels from hemisphere rays; return how many were cast.
 
     origin, normal : (m, 16, 3) float32, metres and unit vectors, world; points of m texels
     lookup : TriangleLookup; seen : SeenLight, light that texels reflect
@@ -108,6 +108,7 @@ def gather(
     lit = len(exitance) > 0
     whole = n_samples / np.pi
     turns, opened = gather_turns(buffers.blend), _f(1.0)
+    cast = 0
     for group in range(0, len(origin), PACKET_WIDTH):
         lanes = smaller(PACKET_WIDTH, len(origin) - group)
         lane_seeds(begin + group, lanes, 25, seeds)
@@ -130,6 +131,7 @@ def gather(
             # Trace one ray of each texel. In a scene with BLEND surfaces, it is traced twice, see
             # `trace_gather`. If no ray of turn 0 stops at a BLEND surface, turn 1 reuses the hits of turn 0.
             if turn == 0 or stopped:
+                cast += lanes
                 aim_lanes(rays, words, frame, seeds, sobol_points[s, 0], sobol_points[s, 1], shared, FAR)
                 trace_gather(
                     buffers.blend, turn, intersect, scene, width, query, on, rays, words, spare_on, spare
@@ -243,6 +245,7 @@ def gather(
                 out[i, c] = total[c * PACKET_WIDTH + lane] * scale
             out[i, OPEN] = total[OPEN * PACKET_WIDTH + lane] / n_samples
             out[i, SQUARE] = squares[lane] * scale * scale
+    return cast
 
 
 @inner

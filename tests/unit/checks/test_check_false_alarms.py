@@ -4,7 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from flawed_scenes import CUBE, FLOOR, GREY, GRID, GRID_TRIANGLE, dimmed, point, quad, scene, sun, with_uv
+from flawed_scenes import (
+    CEILING,
+    CUBE,
+    FLOOR,
+    GREY,
+    GRID,
+    GRID_TRIANGLE,
+    dimmed,
+    point,
+    quad,
+    scene,
+    sun,
+    with_uv,
+)
 from gltf_builder import QUAD_TRIANGLE, write
 
 from baker.checks.run import check_scene
@@ -118,6 +131,21 @@ def test_the_sun_is_as_bright_as_daylight(tmp_path):
     down = (-0.70710678, 0, 0, 0.70710678)
     data = scene((FLOOR, QUAD_TRIANGLE), lights=(sun(down, 1e5), point(1)))
     assert "daylight-levels" not in codes(tmp_path, data)
+
+
+def test_lights_are_not_blamed_for_the_light_of_emitters(tmp_path):
+    bright = {"KHR_materials_emissive_strength": {"emissiveStrength": 1e7}}
+    emitter = {**GREY, "emissiveFactor": [1, 1, 1], "extensions": bright}
+
+    def found(candela):
+        return codes(tmp_path, scene(
+            (FLOOR, QUAD_TRIANGLE), (CEILING, QUAD_TRIANGLE, {}, {}, 1),
+            lights=(point(candela),), materials=(GREY, emitter),
+            extra=lambda builder: builder.json["extensionsUsed"].append("KHR_materials_emissive_strength"),
+        ))  # fmt: skip
+
+    assert "daylight-levels" not in found(1)
+    assert "daylight-levels" in found(3e5)
 
 
 def test_numbers_have_no_exponents(tmp_path):

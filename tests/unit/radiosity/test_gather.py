@@ -6,13 +6,17 @@ import naive
 import numpy as np
 import pytest
 from inner import compiled
-from tiny_scenes import Quad, box_quads, grey, quad_world, seen_light
+from tiny_scenes import Quad, box_quads, grey, quad_scene, quad_world, seen_light
 
-from baker.core.scene import PunctualLight
+from baker.core.lightmap import TexelStatus
+from baker.core.scene import Material, PunctualLight
+from baker.core.settings import make_settings
+from baker.core.stage import Stage
 from baker.kernels.emitters import emitter_density, tile_emitters
 from baker.kernels.rays import lane_seeds
 from baker.kernels.sampling import shared_bits_mask, sobol_reversed, texel_scramble
 from baker.kernels.surface import N_POINTS
+from baker.pipeline.bake import bake
 from baker.radiosity.direct import direct_light
 from baker.radiosity.final_gather import ambient_occlusion, final_gather
 from baker.radiosity.kernels.gather import (
@@ -153,7 +157,7 @@ def test_stages_call_the_kernels_tile_by_tile(room, rays_of):
     for name in ("indirect", "direct", "open", "variance"):
         assert getattr(runs[0], name).tobytes() == getattr(runs[1], name).tobytes()
         assert len(getattr(runs[0], name)) == room.texels.n_front
-    assert runs[0].rays == room.texels.n_front * len(net)
+    assert runs[0].rays == room.texels.n_front * len(net)  # no surface is transparent
     np.testing.assert_allclose(runs[0].open[begin : begin + len(origin)], truth[:, OPEN], atol=1e-6)
     alone = ambient_occlusion(room.job(), n_front, n_samples=n_samples, distance=REACH)
     # Both stages trace the same rays.
@@ -287,3 +291,14 @@ def test_dark_lights_cast_nothing(room):
     assert not direct.complete.any()
     assert not direct.weighted.any()
     assert not direct.variance.any()
+
+
+def test_rays_that_are_cast_twice_count_twice():
+    """A packet of rays is cast again if a ray of it stopped at a pane, here almost all rays of the floor."""
+    pane = Material(base_colour=(1.0, 1.0, 1.0, 0.5), alpha_mode="BLEND", double_sided=True)
+    scene = quad_scene([Quad((0, 0, 0), (0, 0, 1), (1, 0, 0)), Quad((0, 0.1, 0), (0, 0, 1), (1, 0, 0), pane)])
+    settings = make_settings({"resolution": 64, "samples": 64, "sky": "1,1,1", "denoise": False})
+    result = bake(scene, settings=settings)
+    n_front = np.isin(result.status, [TexelStatus.COVERED, TexelStatus.UNCONVERGED]).sum()
+    # Half of the texels are on the pane, and above it is nothing.
+    assert 1.4 < result.rays[Stage.FINAL_GATHER] / (64 * n_front) < 1.5

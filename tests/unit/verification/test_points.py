@@ -157,6 +157,17 @@ def test_border_texels():
     assert not found[0].any()
 
 
+def test_border_texels_beside_an_object_of_a_higher_index():
+    owner = np.full((1, 6, 8), -1, np.int32)
+    owner[0, 1:5, 1:4], owner[0, 1:5, 4:7] = 0, 5
+    covered = owner >= 0
+    covered[0, 2:4, 3] = False
+    found = border_texels(owner, covered)[0]
+    assert found[2:4, 3].all(), "surface of object 0 beyond its covered texels, beside object 5"
+    swapped = np.where(owner == 0, 5, np.where(owner == 5, 0, -1)).astype(np.int32)
+    np.testing.assert_array_equal(border_texels(swapped, covered)[0], found)
+
+
 def test_charts_are_pieces_of_uv():
     quads = [Quad((0, 0, 0), (1, 0, 0), (0, 1, 0)), Quad((0, 0, 2), (0, 3, 0), (1, 0, 1))]
     scene = quad_scene(quads)

@@ -6,6 +6,8 @@ import signal
 import subprocess
 import sys
 
+import pytest
+
 from baker.io.bake.lock import OutputLock
 
 HOLDER = """
@@ -35,6 +37,18 @@ def test_folders_made_for_nothing_are_removed(tmp_path):
     lock = OutputLock(tmp_path / "a" / "b" / "out")
     assert lock.acquire()
     lock.release()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("step", ["try_lock", "os.open"])
+def test_an_attempt_that_fails_leaves_nothing(tmp_path, monkeypatch, step):
+    def fail(*arguments):
+        raise OSError("no locks here")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(f"baker.io.bake.lock.{step}", fail)
+        with pytest.raises(OSError, match="no locks"):
+            OutputLock(tmp_path / "a" / "b" / "out").acquire()
     assert list(tmp_path.iterdir()) == []
 
 
