@@ -180,7 +180,9 @@ class _Tile:
 
 
 class BareRays:
-    """Rays of one kind, which can be traced repeatedly. They start at the texels of every k-th tile.
+    """Rays of one kind, which can be traced repeatedly.
+
+    If there are too many rays to store (`MOST_READY`), they start only at the texels of every k-th tile.
 
     Parameters
     ----------

@@ -129,7 +129,7 @@ class StaticMaterial(Object):
 
 class StaticMesh(Object):
     properties = {"static_materials": ()}
-    # Vertices in the mesh's space, cm; is UV channel 1 that of the file? do UVs have full precision?
+    # Vertices in the mesh's space, cm; whether UV channel 1 is that of the file and UVs have full precision.
     position, uv_1_of_file, precise = None, True, False
 
     def set_material(self, material_index, new_material):

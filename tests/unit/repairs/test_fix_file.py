@@ -77,7 +77,7 @@ def test_what_is_not_fixed_survives(seed, tmp_path):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_look_stays(seed, tmp_path):
-    """Each face with area has the same attributes as before, unless its winding was reported as fixed."""
+    """Each face with area keeps its attributes, except those that were reported as fixed."""
     before, after, fixed = fix_builder(random_builder(seed), tmp_path)
     turned = {
         fix.object.split()[-1]: fix.change.before for fix in fixed.fixed if fix.change.change == "winding"
