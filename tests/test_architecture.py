@@ -165,7 +165,7 @@ def test_pillow_is_imported_by_readers_and_writers_of_pictures_only():
     }
 
 
-def test_numba_lives_low():
+def test_only_low_layers_import_numba():
     homes = {path.parent.name for path in sources(*PACKAGES) if "numba" in imported(path)}
     # The path tracer has separate kernels, because it is the reference with which bakes are compared.
     assert homes <= {"kernels", "lights", "trace", "pathtracer"}

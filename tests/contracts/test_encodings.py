@@ -90,7 +90,7 @@ def test_a_file_holds_every_value_within_the_stated_tolerance(tmp_path, name, nu
 
 
 @pytest.mark.parametrize(("name", "number", "options"), CASES)
-def test_zero_stays_zero_and_the_top_is_held(tmp_path, name, number, options):
+def test_zero_and_the_largest_value_are_kept(tmp_path, name, number, options):
     encoding = ENCODINGS.get(name)
     low, high = encoding.limits(options)
     assert low <= 0 < high
@@ -102,7 +102,7 @@ def test_zero_stays_zero_and_the_top_is_held(tmp_path, name, number, options):
 
 
 @pytest.mark.parametrize(("name", "number", "options"), CASES)
-def test_what_does_not_fit_is_counted_and_stored_at_the_end(tmp_path, name, number, options):
+def test_values_out_of_range_are_counted_and_clamped(tmp_path, name, number, options):
     encoding = ENCODINGS.get(name)
     low, high = encoding.limits(options)
     pixels = np.full((12, 12, number), 0.5 * min(high, 1e30), np.float32)

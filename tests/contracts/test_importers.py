@@ -48,7 +48,7 @@ def test_every_importer_has_a_square():
 
 @pytest.mark.parametrize("suffix", sorted(SQUARES))
 @pytest.mark.parametrize("upper", [False, True])
-def test_the_square_arrives_whole(tmp_path, suffix, upper):
+def test_every_importer_reads_the_same_square(tmp_path, suffix, upper):
     path = tmp_path / f"square{suffix.upper() if upper else suffix}"
     path.write_bytes(SQUARES[suffix])
     scene, again = load_scene(path), load_scene(str(path))

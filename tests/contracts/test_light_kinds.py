@@ -220,10 +220,10 @@ def test_the_example_keeps_the_contract(add_kind, monkeypatch):
     test_lights.test_what_is_written_is_read("beacon", np.inf)
     test_lights.test_the_profile_for_the_path_tracer_is_the_same_light("beacon", np.inf)
     test_lights.test_power_is_the_flux_or_a_bound_of_it("beacon", 0.0)
-    test_lights.test_weights_are_the_closed_form("beacon")
+    test_lights.test_unoccluded_irradiance_equals_the_closed_form("beacon")
     test_lights.test_rays_end_just_before_the_light("beacon")
     test_lights.test_a_candela_a_metre_and_a_lux("beacon")
-    test_lights.test_odd_points("beacon")
+    test_lights.test_no_points_and_points_at_the_light("beacon")
 
 
 def _fill_of(text):

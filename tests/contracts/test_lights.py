@@ -180,7 +180,7 @@ def test_a_range_fades_the_light_out(kind, reach):
 
 
 @pytest.mark.parametrize("kind", sorted(TRUTH))
-def test_weights_are_the_closed_form(kind):
+def test_unoccluded_irradiance_equals_the_closed_form(kind):
     origin, normal = points()
     ray, weight = fill(kind, origin, normal)
     truth = TRUTH[kind](origin.astype(float), normal.astype(float))
@@ -219,7 +219,7 @@ def test_a_candela_a_metre_and_a_lux(kind):
 
 
 @pytest.mark.parametrize("kind", sorted(TRUTH))
-def test_odd_points(kind):
+def test_no_points_and_points_at_the_light(kind):
     """An empty array of points, and a point at the position of the light, give finite results."""
     none = np.zeros((0, 16, 3), np.float32)
     assert fill(kind, none, none)[1].shape == (0, 16)

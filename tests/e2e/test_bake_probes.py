@@ -113,7 +113,7 @@ def test_hall_columns_stand_in_their_own_shade(hall):
     assert foot < 0.85 < 0.95 < free
 
 
-def test_maps_hold_no_rubbish(interior, hall):
+def test_values_are_finite_and_in_range(interior, hall):
     for probe in (interior, hall):
         for lightmap in probe.result.lightmaps.values():
             assert np.isfinite(lightmap.value).all()

@@ -70,7 +70,7 @@ def hidden(folder):
     return list(folder.rglob(".*"))
 
 
-def test_a_night_and_the_next(tree, tmp_path):
+def test_a_second_run_bakes_only_what_changed(tree, tmp_path):
     code, found, text = batch(tree, "--jobs", "2", "--junit", "junit.xml")
     assert (code, states(found)) == (0, ["baked"] * 3), text
     assert [job["out"] for job in found["jobs"]] == ["baked/hall", "baked/room", "baked/shed"]

@@ -71,7 +71,7 @@ def test_stop_is_quick_and_clean(how, number, tmp_path):
     assert list(tmp_path.rglob("*baker-*")) == []
 
 
-def test_hard_end_leaves_folders_of_others_and_removes_parents_it_made(tmp_path):
+def test_a_kill_keeps_other_folders_and_removes_new_parent_folders(tmp_path):
     other = TemporaryFolder(tmp_path / "out")
     other.create()
     process = subprocess.Popen(
@@ -84,7 +84,7 @@ def test_hard_end_leaves_folders_of_others_and_removes_parents_it_made(tmp_path)
     other.remove()
 
 
-def test_hard_end_between_two_renames_brings_the_old_bake_back(tmp_path):
+def test_a_kill_between_two_renames_restores_the_old_bake(tmp_path):
     old = tmp_path / "deep" / "out"
     old.mkdir(parents=True)
     (old / "bake.json").write_text("old")

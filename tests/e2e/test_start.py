@@ -76,7 +76,7 @@ def test_closed_streams(closed, words, tmp_path):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a thread looks for the parent")
-def test_the_work_ends_with_the_process_that_waits_for_it(tmp_path):
+def test_a_kill_of_the_parent_ends_the_child(tmp_path):
     command = [sys.executable, str(FAKE), "deaf", "bake", "scene.glb", "-o", str(tmp_path / "out")]
     process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL)
     ready = tmp_path / "ready"

@@ -120,7 +120,7 @@ def test_tampering_is_caught(sound, tmp_path, name):
         assert found["channels"]["irradiance"]["exponent"] == pytest.approx(1 / 2.2, abs=0.05)
 
 
-def test_light_gained_on_the_whole_is_told(sound, tmp_path):
+def test_limits_on_the_energy_ratio_detect_a_gain_of_light(sound, tmp_path):
     out = tampered(sound, tmp_path, lambda pixels, _: pixels * 1.03)
     limit = ("--fail-if", "irradiance.energy_ratio > 1.02, irradiance.energy_ratio < 0.98")
     code, before = told(sound, *QUICK, *limit)
@@ -138,7 +138,7 @@ def test_light_gained_on_the_whole_is_told(sound, tmp_path):
     assert f"energy ratio {ratio[1]:.4f} +- " in stream.getvalue()
 
 
-def test_texels_stand_for_the_surface_of_their_objects(sound):
+def test_texels_represent_the_area_of_their_objects(sound):
     from baker.core.geometry import world_geometry
     from baker.io.bake.read_bake import read_bake
     from baker.metrics.texel_area import instance_map, surface_points
@@ -213,7 +213,7 @@ def test_reports(sound, tmp_path):
     assert suite.attrib["failures"] == "0"
 
 
-def test_the_same_seed_compares_the_same(sound):
+def test_the_same_seed_gives_the_same_figures(sound):
     one = verify(sound, VerifySettings(texels=100, spp=32, time_limit=None, seed=3, threads=1))
     two = verify(sound, VerifySettings(texels=100, spp=32, time_limit=None, seed=3, threads=2))
     other = verify(sound, VerifySettings(texels=100, spp=32, time_limit=None, seed=4))

@@ -306,7 +306,7 @@ def forgetful(find):
 
 
 @pytest.mark.parametrize("both", [False, True], ids=["the bake's", "both"])
-def test_an_emitter_that_a_finder_forgets_is_missed(tmp_path, monkeypatch, both):
+def test_verify_detects_that_a_bake_lacks_an_emitter(tmp_path, monkeypatch, both):
     """`verify` detects an emitter that its own finder leaves out, too, because reference rays hit it."""
     monkeypatch.setattr("baker.pipeline.prepare.build_emitters", forgetful(build_emitters))
     if both:

@@ -217,7 +217,7 @@ def test_the_flags_of_the_page_keep_all(tmp_path, scene, without_ao, command, te
         (f"{PACK} -kv -c -vtf -vpf -si 0.5", "uv"),
     ],
 )
-def test_other_flags_lose(tmp_path, scene, command, lost):
+def test_other_flags_lose_data(tmp_path, scene, command, lost):
     found = after(tmp_path, scene, command)
     kept = {"uv": found.texels < 0.5, "nodes": found.nodes, "extras": found.extras}
     assert " ".join(name for name, good in kept.items() if not good) == lost

@@ -42,7 +42,7 @@ def test_times_and_places_do_not_count():
     assert normal_json(MANIFEST, PLACES) == {"input": {"path": "<run>/level.glb"}, "pages": MANIFEST["pages"]}
 
 
-def test_figures_count_in_texts():
+def test_numbers_in_texts_are_compared():
     # Numbers with other units, and names that contain digits, are not replaced.
     text = "E = 12.5 lx, 3 texels, ao_0.exr 5.3 kB, 0.5 m"
     assert normal_text(text, {}) == text
@@ -94,7 +94,7 @@ def test_a_record_is_read_as_it_was_written(tmp_path):
     assert read(tmp_path / "folder" / "record") == old
 
 
-def test_bytes_count_where_a_glb_looks_the_same(tmp_path):
+def test_the_binary_chunk_of_a_glb_is_compared(tmp_path):
     write_scenes(tmp_path / "scenes")
     path = tmp_path / "scenes" / "cornell.glb"
     old = file_entry(path, {})

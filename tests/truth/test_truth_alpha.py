@@ -189,7 +189,7 @@ def test_sky_through_blend_and_its_own_reflection():
 
 
 @pytest.mark.parametrize("mode", ["MASK", "BLEND"])
-def test_what_is_not_there_does_not_shine(mode):
+def test_holes_and_transparency_reduce_emission(mode):
     """With holes in half of its area, or with alpha 0.5, an emitter gives half of its light."""
     image = np.repeat(np.array([[0.0, 1.0]]), 2, axis=0)
     half = masked(image=image, emission=10.0) if mode == "MASK" else blended(0.5, emission=10.0)

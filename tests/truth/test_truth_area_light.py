@@ -52,7 +52,7 @@ def test_parallel_square_at_every_texel(denoise):
 
 
 @pytest.mark.parametrize("height", [0.01, 0.03, 0.1, 0.3, 1.0, 2.0])
-def test_close_up_there_is_neither_bias_nor_a_spark(height):
+def test_near_emitters_have_neither_bias_nor_bright_outliers(height):
     """From 1 cm to 2 m below an emitter, E equals the polygon formula, and no texel exceeds 1.25 pi L."""
     found, worst = [], 0.0
     for seed in range(SEEDS):
@@ -72,7 +72,7 @@ def test_close_up_there_is_neither_bias_nor_a_spark(height):
     assert np.abs(np.mean(found, axis=0) - truth).max() < 0.08 * truth.max()
 
 
-def test_penumbra_from_its_first_to_its_last_hair():
+def test_penumbra_equals_the_polygon_formula():
     """Depending on a texel's x, a screen hides the whole emitter, a rectangle of the emitter, or nothing."""
     found = []
     for seed in range(SEEDS):

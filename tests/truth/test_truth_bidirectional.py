@@ -66,7 +66,7 @@ def test_all_estimators_agree_on_mirrors_lobes_and_textures():
 
 @pytest.mark.parametrize("max_bounces", [None, 0, 1])
 @pytest.mark.parametrize("sky", [(0, 0, 0), (0.3, 0.4, 0.5)])
-def test_both_ends_agree_outdoors(sky, max_bounces):
+def test_mis_and_bdpt_agree_outdoors(sky, max_bounces):
     how = {"sky": sky, "max_bounces": max_bounces}
     one = blocks(picture(open_yard(), YARD_CAMERA, "mis", 50, **how), 4)
     other = blocks(picture(open_yard(), YARD_CAMERA, "bdpt", 50, **how), 4)
@@ -75,7 +75,7 @@ def test_both_ends_agree_outdoors(sky, max_bounces):
     assert np.hypot(one[1], other[1]).sum() < 0.05 * one[0].sum()
 
 
-def test_both_ends_agree_at_each_part_of_a_room():
+def test_mis_and_bdpt_agree_in_each_part_of_a_room():
     one = blocks(picture(glossy_room(), ROOM_CAMERA, "mis", 120), 4)
     other = blocks(picture(glossy_room(), ROOM_CAMERA, "bdpt", 80), 4)
     z = (one[0] - other[0]) / np.hypot(one[1], other[1])
@@ -135,7 +135,7 @@ def gap_room():
     return quad_scene([*walls, *screen, emitter])
 
 
-def test_connections_win_where_light_comes_through_a_gap():
+def test_bdpt_has_less_variance_behind_a_gap():
     position = np.random.default_rng(4).uniform((2.2, 0.2, 0), (3.8, 1.8, 0), (128, 1, 3))
     up = np.broadcast_to((0.0, 0.0, 1.0), position.shape).copy()
     cost, mean = {}, {}
@@ -151,7 +151,7 @@ def test_connections_win_where_light_comes_through_a_gap():
     assert cost["bdpt"] < 0.6 * cost["mis"]
 
 
-def test_connections_win_on_a_caustic():
+def test_bdpt_has_less_variance_on_a_caustic():
     # A small emitter over a mirror lights the wall above; paths from the eye rarely find it.
     quads = [
         Quad((0, 0, 0), (1, 0, 0), (0, 1, 0), glossy((0.95, 0.95, 0.95), 1.0, 0.0)),

@@ -60,7 +60,7 @@ def noise(radiance, room, **settings):
 
 
 @pytest.mark.parametrize("bright", [1e4, 1e6])
-def test_bright_lights_next_door_take_no_samples(bright):
+def test_bright_lights_next_door_do_not_raise_the_noise(bright):
     """Noise and light of a room do not depend on lights behind its walls."""
     alone, light = noise((1.0,), 0)
     for radiance, room in (((1.0, bright), 0), ((bright, 1.0, bright), 1)):

@@ -123,7 +123,7 @@ def test_a_light_behind_a_pane_of_hardly_any_alpha_is_not_taken_for_an_unocclude
     np.testing.assert_allclose(found[..., 1] / found[..., 0], 1 - 1 / 1024, rtol=1e-5)
 
 
-def test_what_is_not_there_colours_nothing():
+def test_fully_transparent_surfaces_do_not_colour_light():
     def baked(make):
         builder, _ = floor_under(make, light="point", position=LIGHT_AT)
         return builder.bake(samples=16, sky=(1.0, 1.0, 1.0)).lightmaps["irradiance"].value.tobytes()

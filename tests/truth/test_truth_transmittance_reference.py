@@ -52,7 +52,7 @@ def test_estimators_agree_pairwise_below_a_pane():
 
 @pytest.mark.parametrize("estimator", ["mis", "bdpt"])
 @pytest.mark.parametrize("place", [(0.1, 0.03, 0.0), (0.25, 0.25, 0.0), (0.0, 0.0, 0.0)])
-def test_one_place_under_a_pane_sees_a_point_light_by_its_share(estimator, place):
+def test_shadow_rays_to_a_point_light_are_multiplied_by_the_transmittance(estimator, place):
     """All shadow rays of a point are equal and are multiplied by T, also through the pane's diagonal."""
     scene = quad_scene([Quad((-1, -1, 1), (2, 0, 0), (0, 2, 0), STAINED)])
     scene = replace(scene, lights=(PunctualLight("point", "p", 0, (4.0, 4.0, 4.0), (0.0, 0.0, 2.0)),))
@@ -75,7 +75,7 @@ def test_a_pane_before_the_sky_in_a_picture(estimator):
     assert (error < 0.005).all()
 
 
-def test_first_hits_know_what_was_passed():
+def test_first_hits_have_the_colour_factor_of_crossed_panes():
     quads = [Quad((-4, -4, z), (8, 0, 0), (0, 8, 0), m) for z, m in ((-1, grey()), (0, STAINED))]
     way = np.random.default_rng(0).normal((0, 0, -4), (1, 1, 0), (400, 3))
     way /= np.linalg.norm(way, axis=1, keepdims=True)

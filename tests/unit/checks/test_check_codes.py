@@ -22,7 +22,7 @@ def test_every_code_has_a_case():
 
 
 @pytest.mark.parametrize("code", sorted(CASES))
-def test_fires_on_its_scene_and_not_on_the_twin(tmp_path, code):
+def test_each_code_is_reported_for_the_flawed_scene_only(tmp_path, code):
     case = CASES[code]
     fired = [f for f in findings(tmp_path, case.bad, case.settings) if f.code == code]
     silent = [f for f in findings(tmp_path, case.good, case.settings) if f.code == code]

@@ -140,7 +140,7 @@ def test_materials_say_which_triangles_have_two_sides():
     assert scene.n_triangles == 4
 
 
-def test_nothing_gives_nothing():
+def test_a_scene_without_objects_gives_empty_arrays():
     world = world_geometry(Scene("s", None, (), (grey(),), ()), Atlas(16, 1, (), 0, 1))
     assert world.diagonal == 0.0
     assert world.triangle.shape == (0, 3)

@@ -100,7 +100,7 @@ def test_only_one_file_looks_for_the_nearest_name():
         (Cancelled, 130, "cancelled"),
     ],
 )
-def test_errors_know_their_place(kind, code, name):
+def test_errors_have_kind_exit_code_file_and_object(kind, code, name):
     error = kind("it is so; do this", file="a.glb", object="mesh 3")
     assert isinstance(error, BakerError)
     assert (error.exit_code, error.kind) == (code, name)

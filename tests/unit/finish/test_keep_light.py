@@ -35,7 +35,7 @@ def _finish(
 
 
 @pytest.mark.parametrize("left", [0.9, 0.7, 1.1])
-def test_a_window_gets_the_share_that_the_filter_took(left: float) -> None:
+def test_most_of_the_light_that_the_filter_took_is_restored(left: float) -> None:
     noisy, chart = _pages()
     result = keep_light(noisy, np.float32(left) * noisy, chart, chart >= 0)
     middle = result[24:72, 24:72]
@@ -72,7 +72,7 @@ def test_nothing_crosses_to_another_chart_or_to_texels_that_were_not_chosen() ->
     assert (result[10:, :45] > 0.6).all()
 
 
-def test_few_texels_are_believed_less() -> None:
+def test_few_texels_restore_a_smaller_share() -> None:
     """If a window has few texels, a smaller share of its missing light is restored.
 
     The chart has 25 texels in each of four blocks.

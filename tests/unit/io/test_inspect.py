@@ -68,7 +68,7 @@ def test_an_image_is_measured(tmp_path: Path) -> None:
     assert found["header"]["unit"] == "lx"
 
 
-def test_what_is_nothing_of_that_is_refused(tmp_path: Path) -> None:
+def test_missing_files_and_folders_without_a_bake_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         inspect_path(tmp_path / "absent")
     with pytest.raises(InputError, match="holds no bake"):

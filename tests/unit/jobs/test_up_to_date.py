@@ -99,7 +99,7 @@ def test_a_broken_manifest(copy, text):
     assert not look(copy).fresh
 
 
-def test_nothing_there(copy):
+def test_a_missing_output_folder(copy):
     shutil.rmtree(copy / "out")
     assert look(copy).why == "not baked yet"
 

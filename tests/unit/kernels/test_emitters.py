@@ -211,7 +211,7 @@ def test_a_sphere_around_points():
     assert radius <= np.sqrt(3) * distance.max()
 
 
-def test_the_two_halves_of_mis_make_one_whole():
+def test_both_mis_estimates_sum_to_the_integrand():
     """For each direction, n_l p_l w_l + n_h p_h w_h is the integrand, here the cosine.
 
     n is the number of samples, p their density per solid angle, and w the MIS-weighted integrand, of light

@@ -90,7 +90,7 @@ def test_pixels_beside_a_chart_know_its_texels():
     np.testing.assert_array_equal(beside, lookup[:, 1:][(~covered[:, :-1]) & covered[:, 1:]])
 
 
-def test_two_sides_without_a_texel_are_looked_up_nowhere():
+def test_backs_without_texels_are_not_looked_up():
     """If no two-sided triangle has texels, the texel buffer has no entries for backs.
 
     The table must then mark all triangles as one-sided, so that no hit on a back is looked up.

@@ -90,7 +90,7 @@ def test_one_quad_with_very_many_repeats(calls, repeats, size, wrap, nearest):
     check_work(calls)
 
 
-def test_what_wants_little_gets_it():
+def test_the_fair_limit_reduces_only_the_largest_demands():
     wanted = np.array([5.0, 1.0, 90.0, 40.0])
     assert fair_limit(wanted, 200.0) == np.inf
     limit = fair_limit(wanted, 50.0)

@@ -132,7 +132,7 @@ def test_sampled_points_lie_where_their_density_says():
     np.testing.assert_allclose(found, truth, rtol=0.02)
 
 
-def test_a_palette_texture_costs_nothing():
+def test_equal_uv_give_one_part_per_triangle():
     """If all uv are equal, each triangle is a single part with the constant radiance of one texel."""
     image = blobs(8)
     world = plate(emissive(image))

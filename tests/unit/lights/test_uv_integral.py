@@ -152,7 +152,7 @@ def test_black_is_exactly_black():
         assert not spread.any()
 
 
-def test_a_hundred_repeats_cost_and_give_what_they_should():
+def test_a_hundred_repeats_have_the_mean_of_the_texture():
     image = np.zeros((64, 64, 4), np.float32)
     image[5, 9, :3] = 1.0
     square = 100.0 * np.array([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]], float)

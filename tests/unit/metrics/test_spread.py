@@ -23,7 +23,7 @@ def drawn(rng, n, own, noise, light=None):
 
 
 @pytest.mark.parametrize(("own", "noise"), [(0.15, 0.0), (0.15, 0.1), (0.15, 0.2), (0.05, 0.02), (0.0, 0.1)])
-def test_it_is_the_error_that_was_put_in(own, noise):
+def test_the_estimate_equals_the_error_of_the_map(own, noise):
     rng = np.random.default_rng(0)
     found = [own_error(*drawn(rng, 200, own, noise), 0.01, 3.0) for _ in range(200)]
     # The estimate cannot be negative, so for an exact map its mean is above 0. If the map's own error is

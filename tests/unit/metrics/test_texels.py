@@ -96,7 +96,7 @@ def test_every_object_and_every_brightness_is_chosen():
     assert len(choose_texels(owner, eligible, light, 10**6, 0)) == (eligible & (owner >= 0)).sum()
 
 
-def test_shift_and_curve_are_seen_and_nothing_else_is():
+def test_shifts_and_power_curves_are_detected():
     y, x = np.mgrid[:64, :64] / 64
     page = (1.5 + np.sin(7 * x) * np.cos(5 * y))[None]
     pixel = np.random.default_rng(0).choice(64 * 64, 500, replace=False)

@@ -91,7 +91,7 @@ def test_all_ways_to_scatter_carry_the_same_light(hemisphere):
 
 
 @pytest.mark.parametrize("hemisphere", [1, 2])
-def test_a_mirror_keeps_its_chance(hemisphere):
+def test_mirror_samples_are_the_same_for_all_ways_to_sample(hemisphere):
     found = scatter_many(np.array(MIRROR), AXIS, hemisphere, np.random.default_rng(3).random((N, 3)))
     mirrored = found[:, 3] == 0
     own = scatter_many(np.array(MIRROR), AXIS, 0, np.random.default_rng(3).random((N, 3)))

@@ -116,7 +116,7 @@ def test_spots_fill_their_cone():
     uniform((cosine - math.cos(0.7)) / (1 - math.cos(0.7)))
 
 
-def test_points_shine_everywhere():
+def test_point_lights_emit_in_all_directions():
     _, _, _, out = starts(scene_with(POINT))
     way = out[:, GO : GO + 3]
     uniform(0.5 * (1 + way[:, 2]))

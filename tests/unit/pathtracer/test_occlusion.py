@@ -76,7 +76,7 @@ def opened(reference, position, distance, samples=64):
 
 
 @pytest.mark.parametrize("distance", [1.0, np.inf])
-def test_packets_followed_as_one_meet_the_same(under_cards, monkeypatch, distance):
+def test_coherent_packets_find_the_same_hits(under_cards, monkeypatch, distance):
     reference, position = under_cards
     found, asked = [], []
 
@@ -97,7 +97,7 @@ def test_packets_followed_as_one_meet_the_same(under_cards, monkeypatch, distanc
     assert (found[0] != found[1]).sum() <= 2
 
 
-def test_a_point_is_the_same_in_any_company(under_cards):
+def test_estimates_do_not_depend_on_other_points(under_cards):
     """The estimate of a point does not depend on the other points, with which it may share packets."""
     reference, position = under_cards
     together = opened(reference, position, 1.0)

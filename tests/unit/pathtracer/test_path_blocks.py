@@ -112,7 +112,7 @@ def even(count):
     return stats.chisquare(count.ravel()).pvalue > ALPHA
 
 
-def test_numbers_are_even_alone_in_pairs_and_between_neighbours():
+def test_random_numbers_are_uniform_alone_and_in_pairs():
     number = many_numbers()
     assert number.min() >= 0.0
     assert number.max() < 1.0
@@ -225,7 +225,7 @@ def some_lights():
 
 
 @pytest.mark.parametrize(("mode", "power"), [(0, 0), (1, 0), (2, 0), (2, 1)])
-def test_lights_are_aimed_at_as_one_at_a_time(some_lights, mode, power):
+def test_blocks_sample_lights_like_single_paths(some_lights, mode, power):
     sky = some_lights.sky
     s, words, rows = blocks(1)
     bits = words.reshape(N_ROWS, BLOCK_WIDTH)
@@ -281,7 +281,7 @@ def test_lights_are_aimed_at_as_one_at_a_time(some_lights, mode, power):
     assert len(lit) == {0: 4}.get(mode, 25)
 
 
-def test_few_lights_and_many_are_chosen_alike(some_lights):
+def test_lights_are_chosen_by_their_cumulative_probability(some_lights):
     s, words, _ = blocks(1)
     bits = words.reshape(N_ROWS, BLOCK_WIDTH)
     rng = np.random.default_rng(3)
@@ -299,7 +299,7 @@ def test_few_lights_and_many_are_chosen_alike(some_lights):
             assert (light == np.searchsorted(cumulative, choice, side="right")).all()
 
 
-def test_hits_become_vertices_as_one_at_a_time():
+def test_blocks_shade_hits_like_single_paths():
     rng = np.random.default_rng(11)
     n = 400
     surface = np.zeros((n, ROW_LENGTH), np.float32)

@@ -67,7 +67,7 @@ def test_extreme_light_gives_a_usable_number(value):
     assert np.isfinite(np.float32(found))
 
 
-def test_no_texels_are_as_black():
+def test_without_texels_the_exposure_is_one():
     assert suggested_exposure(pages(np.ones(100)), PIXEL[:0], WHITE[:0]) == 1.0
 
 

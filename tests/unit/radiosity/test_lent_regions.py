@@ -51,7 +51,7 @@ def test_points_within_a_texel_of_its_centre_decide(floor):
     assert lent(floor, 6.3, 8.1) == [{1}]
 
 
-def test_where_nobody_looks_the_nearest_region_is_taken(floor):
+def test_texels_that_no_lookup_uses_get_the_nearest_region(floor):
     found = lent(floor, 3.9, 11.1)
     assert len(found) == 7
     assert found[:3] == [{0}] * 3

@@ -100,7 +100,7 @@ def test_turning_normals_split_blocks(most):
     assert patches.n >= min(8, most)
 
 
-def test_means_weigh_by_what_they_are_told(texels):
+def test_means_use_the_given_weights(texels):
     patches = build_patches(texels, max_patches=100)
     value = np.random.default_rng(1).random((texels.n, 3), np.float32)
     mean = patches.mean(value, texels.area)

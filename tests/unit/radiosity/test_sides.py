@@ -126,7 +126,7 @@ def test_patches_end_at_walls_though_their_chart_goes_on():
     assert set(loose.patch[floor[left]]) & set(loose.patch[floor[~left]])
 
 
-def test_values_of_sides_are_found_behind_the_numbers_in_the_images():
+def test_images_refer_to_the_values_of_sides():
     sides = cut(floor_and(wall(0.5)))
     light = np.arange(4 * sides.texels.n, dtype=np.float32).reshape(-1, 4)
     seen = sides.seen_light(light)

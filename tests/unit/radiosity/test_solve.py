@@ -110,7 +110,7 @@ def test_coloured_light_between_patches_is_a_solve_for_each_colour(bounces):
         assert energy["absorbed"] + energy["escaped"] == pytest.approx(energy["emitted"], rel=1e-4)
 
 
-def test_the_residual_is_what_it_says():
+def test_the_reported_residual_is_correct():
     matrix, dense, area, rng = room(40, 2)
     albedo, source = np.full((40, 3), 0.7), rng.random((40, 3))
     solution = solve_radiosity(matrix, source, albedo, area, bounces=None, progress=silent)

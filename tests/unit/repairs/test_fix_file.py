@@ -76,7 +76,7 @@ def test_what_is_not_fixed_survives(seed, tmp_path):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_the_look_stays(seed, tmp_path):
+def test_fixes_keep_the_attributes_of_faces(seed, tmp_path):
     """Each face with area keeps its attributes, except those that were reported as fixed."""
     before, after, fixed = fix_builder(random_builder(seed), tmp_path)
     turned = {

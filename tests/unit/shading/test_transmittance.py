@@ -176,7 +176,7 @@ def test_a_thin_box_is_two_surfaces():
         np.testing.assert_allclose(found, np.tile(SHARE**2, (len(found), 1)), rtol=1e-5)
 
 
-def test_surfaces_are_what_hangs_together():
+def test_connected_triangles_are_one_surface():
     geometry, shading = mesh_scene(split(*grid(3)), joined(grid(2), grid(2, 1.0), grid(2)), grid(1))
     number = shading.alpha.row[:, SURFACE]
     assert len(number) == len(geometry.triangle)
@@ -203,7 +203,7 @@ def test_a_pane_seen_edge_on_is_crossed_by_nothing():
     assert (visible(shaded([pane()]), origin, along) == 1).all()
 
 
-def test_fifty_cards_are_a_product_and_not_a_chance():
+def test_fifty_cards_multiply_light_without_randomness():
     cards = [pane(0.05 * k, (0.9, 1.0, 0.8), 0.1) for k in range(50)]
     found = visible(shaded(cards), *down(PACKET_WIDTH * 16))
     np.testing.assert_allclose(found[0], passed((0.9, 1.0, 0.8), 0.1) ** 50, rtol=1e-4)
@@ -212,7 +212,7 @@ def test_fifty_cards_are_a_product_and_not_a_chance():
     assert (visible(shaded([pane(0.05 * k, alpha=0.9) for k in range(50)]), *down()) == 0).all()
 
 
-def test_rays_of_all_directions_are_asked_once_at_each_crossing():
+def test_each_crossing_counts_once_for_rays_of_all_directions():
     """Compare with a loop over all triangles.
 
     With Embree's coherent flag, the filter would be called once for each octant of ray directions.

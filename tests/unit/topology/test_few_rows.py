@@ -27,7 +27,7 @@ def large(monkeypatch):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_small_meshes_give_what_large_ones_do(seed, large):
+def test_code_for_small_and_large_meshes_agrees(seed, large):
     rng = np.random.default_rng(seed)
     n = int(rng.integers(1, unique_rows.FEW + 1))
     position = rng.choice(np.float32([-1, -0.0, 0, 1, np.nan]), (n, 3)).astype(np.float32)

@@ -173,7 +173,7 @@ def test_a_sky_sphere_is_no_solid(inward, emits):
     assert found[0][1].all()
 
 
-def test_nothing_comes_of_nothing():
+def test_no_triangles_give_no_solids():
     assert kinds(classify(np.zeros((0, 3, 3)))) == [[]]
 
 

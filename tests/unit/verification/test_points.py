@@ -74,7 +74,7 @@ def test_a_gap_is_no_room():
     assert not near[np.abs(points.position[:, 0, :2] - 0.5).max(axis=1) > 0.45].all()
 
 
-def test_nobody_looks_around_from_inside_of_solids():
+def test_points_in_the_air_are_not_inside_solids():
     floor = Quad((-2, -2, 0), (4, 0, 0), (0, 4, 0))
     corners = [((-0.8, -0.5, -0.3), (0.4, 0.6, 0.9)), ((-0.2, -0.7, -0.4), (0.9, 0.3, 0.7))]
     corners.append(((-0.5, -0.1, -0.2), (0.6, 0.8, 0.6)))

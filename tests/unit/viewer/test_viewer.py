@@ -109,11 +109,11 @@ def test_only_this_machine_is_answered(server):
     assert ask(server, "/scene.json", host=f"localhost:{server.server_port}")[0].status == 200
 
 
-def test_writing_is_no_method(server):
+def test_methods_that_write_are_refused(server):
     assert ask(server, "/scene.json", method="POST")[0].status == 501
 
 
-def test_a_file_that_went_away_is_an_answer(server, out):
+def test_a_deleted_file_gives_an_error_status(server, out):
     ao = out / "ao_1.exr"
     content = ao.read_bytes()
     ao.unlink()
@@ -126,7 +126,7 @@ def test_a_taken_port_is_said(server, out):
         make_server(read_bake(out), find_three(None), port=server.server_port)
 
 
-def test_halves_stay_halves_and_others_do_not():
+def test_values_of_half_floats_are_sent_as_half_floats():
     rng = np.random.default_rng(0)
     half = rng.normal(0, 100, (4, 5, 3)).astype(np.float16).astype(np.float32)
     half[0, 0] = (np.inf, np.nan, 6.1e-5)
@@ -203,7 +203,7 @@ def test_a_missing_library_is_a_sentence(monkeypatch):
         find_three(None)
 
 
-def test_names_stay_inside_the_page(out):
+def test_scripts_build_no_html_from_strings(out):
     # The page must show names as text only, so its scripts may not build HTML from strings.
     for path in (Path(script.__file__).parent / "static").glob("*.js"):
         text = path.read_text("utf-8")

@@ -20,7 +20,7 @@ time.sleep(60)
 """
 
 
-def test_one_holds_it_and_leaves_nothing(tmp_path):
+def test_one_process_holds_the_lock_and_no_file_remains(tmp_path):
     out = tmp_path / "deep" / "out"
     first, second = OutputLock(out), OutputLock(out)
     assert first.acquire()

@@ -79,7 +79,7 @@ def paths_in(value: Any, path: tuple[str | int, ...] = ()) -> list[tuple[str | i
         (("versions",), []),
     ],
 )
-def test_what_cannot_be_is_refused(out: Path, path: tuple[str | int, ...], value: Any) -> None:
+def test_impossible_values_are_refused(out: Path, path: tuple[str | int, ...], value: Any) -> None:
     damage(out, path, value)
     for read in (read_bake, inspect_path):
         with pytest.raises(InputError) as error:

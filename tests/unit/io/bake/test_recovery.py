@@ -114,7 +114,7 @@ def whole(out: Path) -> str:
     return words.pop()
 
 
-def test_killed_at_any_step(out: Path) -> None:
+def test_recovery_after_a_kill_at_any_step(out: Path) -> None:
     seen, step = [], 0
     while ends_by_kill(lambda: write_new(out), step):
         recover(out)
@@ -141,7 +141,7 @@ def test_a_recovery_that_is_killed_is_repeated(out: Path) -> None:
     assert recoveries > 5
 
 
-def test_the_next_bake_is_such_a_command(out: Path) -> None:
+def test_the_next_bake_restores_the_folder_first(out: Path) -> None:
     step = 0
     while ends_by_kill(lambda: write_new(out), step):
         write_old(out)
@@ -151,7 +151,7 @@ def test_the_next_bake_is_such_a_command(out: Path) -> None:
 
 
 @pytest.mark.parametrize("read", [read_manifest, inspect_path, lambda out: inspect_path(out / "bake.json")])
-def test_so_is_a_command_that_only_reads(out: Path, read: Callable[[Path], object]) -> None:
+def test_commands_that_only_read_restore_the_folder_first(out: Path, read: Callable[[Path], object]) -> None:
     """`verify`, `diff` and `view` restore a bake before they read its manifest, which here is invalid."""
     step = 0
     while ends_by_kill(lambda: write_new(out), step):

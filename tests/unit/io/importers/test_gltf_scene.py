@@ -61,7 +61,7 @@ def test_a_mirrored_instance_keeps_the_mesh_as_the_file_has_it(tmp_path):
 
 
 @pytest.mark.parametrize("scale", [[0, 1, 1], [0, 0, 0], [1, 1, 1e-12]])
-def test_flat_instances_go_with_a_warning(tmp_path, scale):
+def test_flat_instances_are_left_out_with_a_warning(tmp_path, scale):
     builder = quad_builder()
     builder.node(mesh=0, scale=scale, name="flat")
     scene = load(tmp_path, builder)

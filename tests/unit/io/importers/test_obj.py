@@ -140,7 +140,7 @@ def test_a_missing_library_or_material_gives_grey(tmp_path):
     assert "no-material" in codes(scene)
 
 
-def test_vertices_that_are_no_numbers_take_their_faces_with_them(tmp_path):
+def test_faces_with_invalid_vertices_are_left_out(tmp_path):
     scene = load(tmp_path, SQUARE + "v nan 5 5\nv 1 1e999 0\nv 2 two 2\nf 1 2 3\nf 1 2 5\nf 1 6 2\nf 2 3 7\n")
     assert scene.n_triangles == 1
     assert codes(scene)["bad-vertices"].startswith("3 triangles")
@@ -180,7 +180,7 @@ def test_bad_files_are_refused_in_a_sentence(tmp_path, text, words):
 
 @pytest.mark.parametrize("broken", ["Kd 0.5 x 0", "Ke -1 0 0", "map_Kd gone.png", "Kd spectral f.rfl"])
 @pytest.mark.parametrize("name", ["b", "two words"])
-def test_a_broken_material_that_no_face_has_is_no_matter(tmp_path, broken, name):
+def test_unused_broken_materials_are_accepted(tmp_path, broken, name):
     (tmp_path / "m.mtl").write_text(f"newmtl {name}\n{broken}\nnewmtl a\nKd 0.25 0.5 0.75\n")
     scene = load(tmp_path, "mtllib m.mtl\nusemtl a\n" + SQUARE + "f 1 2 3\n")
     assert [m.name for m in scene.materials] == [name, "a"]
