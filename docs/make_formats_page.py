@@ -20,35 +20,37 @@ generates this page from the code.
 
 ## Textures
 
-PNG, JPEG, WebP, AVIF, BMP, TGA, TIFF, GIF and KTX2 (Basis Universal) pictures are read, with 1 to 16 bits,
-grey, palette or four inks (CMYK); 16 bits are rounded to 8. Rotations in EXIF data are ignored, as glTF
-demands. AVIF needs a Pillow that can decode it. KTX2 needs the package `opengl-basisu` (`pip install
-opengl-basisu`), of which only pre-releases exist.
+Images may be PNG, JPEG, WebP, AVIF, BMP, TGA, TIFF, GIF or KTX2 (Basis Universal). Their pixels may be RGB,
+grey, indices of a palette, or CMYK. Images with 16 bits per channel are reduced to 8. Rotations in EXIF data
+are ignored, as glTF demands. AVIF images need a build of Pillow that decodes AVIF. KTX2 images need the
+package `opengl-basisu` (`pip install opengl-basisu`).
 
-A texture of glTF may name several pictures. The first one that can be decoded is used, in this order: WebP,
-AVIF, the texture's own `source` (PNG or JPEG), KTX2. The repeat modes of samplers, `KHR_texture_transform`,
-and each of TEXCOORD_0 to TEXCOORD_15 are applied.
+A glTF texture may name several images. The first one that can be decoded is used, in this order: WebP,
+AVIF, the texture's own `source` (PNG or JPEG), KTX2. The wrap modes of samplers and
+`KHR_texture_transform` are applied. Textures may use TEXCOORD_0 to TEXCOORD_15.
 
-A picture that light does not need (normals, roughness, occlusion) may be missing; that is a warning. A
-missing picture of base colour, emission or alpha is an error, unless `--missing-textures` names a colour
-that replaces it: `white`, `grey` (0.5, linear) or `magenta`, with alpha 1. `scene.glb` keeps the name of
-the missing picture. The same is true for the pictures of MTL files.
+Images that a bake does not use (normals, roughness, occlusion) may be missing: the bake prints a warning. A
+missing image of base colour, emission or alpha is an error, unless `--missing-textures` names a colour
+that replaces the image: `white`, `grey` (0.5, linear) or `magenta`, with alpha 1. `scene.glb` keeps the name
+of the missing image. Images that an MTL file names are treated alike.
 
 ## Materials of glTF
 
-- The base colour is factor times texture times vertex colour (`COLOR_0`). Metals reflect it diffusely, like
-  all other materials. `KHR_materials_pbrSpecularGlossiness` replaces it by the diffuse colour.
-- Unlit materials (`KHR_materials_unlit`) have their light in their texture. They block light, but neither
-  reflect nor emit it; `--unlit lit` treats them like other materials.
+- The base colour is factor x texture x vertex colour (`COLOR_0`). All materials, metals included, reflect
+  their base colour diffusely. In a material with `KHR_materials_pbrSpecularGlossiness`, the diffuse colour of
+  the extension is the base colour.
+- Unlit materials (`KHR_materials_unlit`) block light, and neither reflect nor emit light, because the colour
+  of such materials usually contains light already. With `--unlit lit` they reflect their base colour like
+  other materials, but still emit nothing.
 - `--variant NAME` bakes the materials of one variant (`KHR_materials_variants`). `scene.glb` keeps all
   variants and the materials that are shown without a variant.
 
 ## Scenes of glTF
 
-`--scene NAME` or `--scene N` chooses a scene, by its name if a scene has this name, else by its number from
-0. The chosen scene becomes the default scene of `scene.glb`. Nodes of the other scenes stay, without
-lightmap uv. Nodes that `KHR_node_visibility` hides, and all nodes below them, neither block light nor get
-texels, and their lights are off.
+`--scene NAME` chooses the scene of this name. `--scene N` chooses a scene by its index, from 0, unless a
+scene has the name `N`. The chosen scene becomes the default scene of `scene.glb`. `scene.glb` keeps the nodes
+of the other scenes, without lightmap uv. Nodes that `KHR_node_visibility` hides, and all nodes below them,
+neither block light nor get texels, and their lights are off.
 
 ## Extensions of glTF
 

@@ -87,10 +87,10 @@ class BakeKeywords(TypedDict, total=False):
     # Material variant of a glTF file; default: the materials without a variant.
     variant: str | None
 
-    # Colour of textures of base colour, emission and alpha that cannot be read, or `error`.
+    # Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.
     missing_textures: Literal["error", "white", "grey", "magenta"]
 
-    # Unlit materials of glTF: `block` light and reflect none, or `lit` like other materials.
+    # Unlit materials of glTF only block light (`block`), or also reflect it like others (`lit`).
     unlit: Literal["block", "lit"]
 
     # Also read referenced files outside the scene's folder.
@@ -228,10 +228,10 @@ class LoadKeywords(TypedDict, total=False):
     # Material variant of a glTF file; default: the materials without a variant.
     variant: str | None
 
-    # Colour of textures of base colour, emission and alpha that cannot be read, or `error`.
+    # Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.
     missing_textures: Literal["error", "white", "grey", "magenta"]
 
-    # Unlit materials of glTF: `block` light and reflect none, or `lit` like other materials.
+    # Unlit materials of glTF only block light (`block`), or also reflect it like others (`lit`).
     unlit: Literal["block", "lit"]
 
     # Also read referenced files outside the scene's folder.
@@ -277,7 +277,7 @@ class RenderKeywords(TypedDict, total=False):
     # Run Open Image Denoise over the picture.
     denoise: bool
 
-    # Output folder of a bake. Its scene is rendered in place of `scene`, lit by its lightmaps,
+    # Output folder of a bake. Instead of the input, its scene is rendered, lit by its lightmaps,
     # without path tracing.
     lightmap: str | Path | None
 
@@ -293,10 +293,10 @@ class RenderKeywords(TypedDict, total=False):
     # Material variant of a glTF file; default: the materials without a variant.
     variant: str | None
 
-    # Colour of textures of base colour, emission and alpha that cannot be read, or `error`.
+    # Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.
     missing_textures: Literal["error", "white", "grey", "magenta"]
 
-    # Unlit materials of glTF: `block` light and reflect none, or `lit` like other materials.
+    # Unlit materials of glTF only block light (`block`), or also reflect it like others (`lit`).
     unlit: Literal["block", "lit"]
 
     # Also read referenced files outside the scene's folder.

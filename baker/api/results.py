@@ -207,7 +207,7 @@ def render(
         denoise : bool, default False
             Run Open Image Denoise over the picture.
         lightmap : str | Path | None, default None
-            Output folder of a bake. Its scene is rendered in place of `scene`, lit by its lightmaps,
+            Output folder of a bake. Instead of the input, its scene is rendered, lit by its lightmaps,
             without path tracing.
         sky : str | float | Sequence[float] | None, cd/m2, default None
             Sky radiance R,G,B in cd/m2. Default: black; with `lightmap`, the sky of the bake.
@@ -218,9 +218,9 @@ def render(
         variant : str | None, default None
             Material variant of a glTF file; default: the materials without a variant.
         missing_textures : Literal["error", "white", "grey", "magenta"], default 'error'
-            Colour of textures of base colour, emission and alpha that cannot be read, or `error`.
+            Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.
         unlit : Literal["block", "lit"], default 'block'
-            Unlit materials of glTF: `block` light and reflect none, or `lit` like other materials.
+            Unlit materials of glTF only block light (`block`), or also reflect it like others (`lit`).
         allow_outside : bool, default False
             Also read referenced files outside the scene's folder.
         seed : int, 0 to 2147483647, default 0

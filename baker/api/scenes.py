@@ -43,9 +43,9 @@ def load(path: str | Path, settings: LoadSettings | None = None, **keywords: Unp
         variant : str | None, default None
             Material variant of a glTF file; default: the materials without a variant.
         missing_textures : Literal["error", "white", "grey", "magenta"], default 'error'
-            Colour of textures of base colour, emission and alpha that cannot be read, or `error`.
+            Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.
         unlit : Literal["block", "lit"], default 'block'
-            Unlit materials of glTF: `block` light and reflect none, or `lit` like other materials.
+            Unlit materials of glTF only block light (`block`), or also reflect it like others (`lit`).
         allow_outside : bool, default False
             Also read referenced files outside the scene's folder.
 

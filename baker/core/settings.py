@@ -127,12 +127,12 @@ class CommonSettings(Settings):
     )
     missing_textures: Literal["error", "white", "grey", "magenta"] = setting(
         "error",
-        "Colour of textures of base colour, emission and alpha that cannot be read, or `error`.",
+        "Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.",
         group=SCENE,
     )
     unlit: Literal["block", "lit"] = setting(
         "block",
-        "Unlit materials of glTF: `block` light and reflect none, or `lit` like other materials.",
+        "Unlit materials of glTF only block light (`block`), or also reflect it like others (`lit`).",
         group=SCENE,
     )
     allow_outside: bool = allow_outside_setting()

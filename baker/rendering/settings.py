@@ -65,7 +65,7 @@ class RenderSettings(Settings):
     denoise: bool = setting(False, "Run Open Image Denoise over the picture.")
     lightmap: Path | None = setting(
         None,
-        "Output folder of a bake. Its scene is rendered in place of `scene`, lit by its lightmaps, without "
+        "Output folder of a bake. Instead of the input, its scene is rendered, lit by its lightmaps, without "
         "path tracing.",
         metavar="OUT",
     )

@@ -300,5 +300,5 @@ def test_rays_that_are_cast_twice_count_twice():
     settings = make_settings({"resolution": 64, "samples": 64, "sky": "1,1,1", "denoise": False})
     result = bake(scene, settings=settings)
     n_front = np.isin(result.status, [TexelStatus.COVERED, TexelStatus.UNCONVERGED]).sum()
-    # Half of the texels are on the pane, and above it is nothing.
+    # The other half of the texels are on the pane. Their rays leave the scene, and are cast once.
     assert 1.4 < result.rays[Stage.FINAL_GATHER] / (64 * n_front) < 1.5
