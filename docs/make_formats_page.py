@@ -10,7 +10,8 @@ import sys
 from pathlib import Path
 
 from baker.io.formats import scene_suffixes
-from baker.io.gltf.extension import EXTENSIONS, UNKNOWN, GltfExtension
+from baker.io.gltf.extension import UNKNOWN, GltfExtension
+from baker.io.gltf.known_extensions import known_extensions
 
 HEAD = """\
 # Scene files
@@ -71,7 +72,7 @@ def page() -> str:
     """Return the text of the page."""
     *others, last = (suffix.removeprefix(".") for suffix in scene_suffixes())
     head = HEAD.format(formats=f"{', '.join(others)} and {last}", unknown=UNKNOWN)
-    rows = [_row(name, EXTENSIONS.require(name, "extension")) for name in EXTENSIONS.names()]
+    rows = [_row(name, extension) for name, extension in known_extensions().items()]
     return (
         head
         + "\n".join(

@@ -8,6 +8,7 @@ from baker.core.errors import InputError, ResourceError
 from baker.core.light_limits import check_brightness
 from baker.io.gltf.data_ranges import range_faults
 from baker.io.gltf.document import open_document
+from baker.io.gltf.expand import expand_document
 from baker.io.load import IMPORTERS, SceneFile, load_scene, read_scene_file
 from baker.io.scene_folder import SceneFolder
 
@@ -47,14 +48,19 @@ def check_readable(out: Path, data: bytes, scene: Path, *, allow_outside: bool) 
 
 def _check_ranges(out: Path, data: bytes, scene: Path, *, allow_outside: bool) -> None:
     """Raise `InputError` for the first buffer view or accessor that fixing has made unreadable."""
-    faults = range_faults(open_document(out, data, SceneFolder(out.parent, allow_outside)))
+    faults = _faults(out, data, allow_outside)
     if faults and scene.suffix.lower() in (".glb", ".gltf"):
         # Ignore views and accessors that were unreadable before the fix. Fixing keeps their indices.
-        folder = SceneFolder(scene.parent, allow_outside)
-        before = range_faults(open_document(scene, read_scene_file(scene), folder))
+        before = _faults(scene, read_scene_file(scene), allow_outside)
         faults = {where: fault for where, fault in faults.items() if where not in before}
     for fault in faults.values():
         raise fault
+
+
+def _faults(path: Path, data: bytes, allow_outside: bool) -> dict[tuple[str, int], InputError]:
+    """Return the unreadable buffer views and accessors of a file."""
+    document, _ = expand_document(open_document(path, data, SceneFolder(path.parent, allow_outside)))
+    return range_faults(document)
 
 
 def _check_input(scene: Path, *, allow_outside: bool) -> None:

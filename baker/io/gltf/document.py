@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -24,7 +24,6 @@ from baker.io.scene_folder import OutsideError, OutsideName, SceneFolder
 _LISTS = ("accessors", "bufferViews", "materials", "meshes", "nodes", "images", "samplers", "textures")
 # Largest depth of nested JSON objects and lists in a top-level member.
 _DEEPEST = 100
-_COMPRESSED_VIEW = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
 @dataclass(frozen=True)
@@ -47,6 +46,8 @@ class GltfDocument:
     sha256 : str
         SHA-256 of the scene file, followed by the external buffers (at most `byteLength` bytes of each) and
         the external images.
+    data_faults : dict of str to InputError
+        The errors of compressed data that cannot be decoded, by the path of the JSON object.
     """
 
     root: JsonObject
@@ -57,6 +58,7 @@ class GltfDocument:
     chunks: tuple[tuple[int, bytes], ...]
     folder: SceneFolder
     sha256: str
+    data_faults: dict[str, InputError] = field(default_factory=dict)
 
     def view(self, index: int) -> tuple[bytes, int, int, int]:
         """Return (buffer, byte offset, byte length, byte stride or 0) of a buffer view.
@@ -64,18 +66,11 @@ class GltfDocument:
         Raises
         ------
         InputError
-            If the view exceeds its buffer, its data exists only in compressed form, or the buffer cannot be
-            read.
+            If the view exceeds its buffer, its data could not be decoded, or the buffer cannot be read.
         """
         view = self.root.children("bufferViews")[index]
-        for name in _COMPRESSED_VIEW:
-            if view.extension(name) is not None:
-                buffer = self.root.children("buffers")[view.index("buffer", len(self.buffers), "buffers")]
-                fallback = buffer.extension(name)
-                if fallback is not None and fallback.boolean("fallback", False):
-                    view.fail(
-                        f"the data is compressed with {name}, which is not understood; export without it"
-                    )
+        if view.where in self.data_faults:
+            raise self.data_faults[view.where]
         number = view.index("buffer", len(self.buffers), "buffers")
         if number in self.buffer_faults:
             raise self.buffer_faults[number]
@@ -205,11 +200,6 @@ def _read_buffer(
         elif chunk is not None:
             data = chunk
         else:
-            for name in _COMPRESSED_VIEW:
-                if buffer.extension(name) is not None:
-                    buffer.fail(
-                        f"the data is compressed with {name}, which is not understood; export without it"
-                    )
             buffer.fail("the buffer has neither a uri nor a BIN chunk; export the file again")
         if len(data) < length:
             buffer.fail(f"the buffer is too short: byteLength is {length}, its data has {len(data)} bytes")

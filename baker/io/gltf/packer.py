@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from baker.core.errors import ResourceError
 from baker.io.gltf.chunks import CHUNK_BIN, CHUNK_JSON
+from baker.io.gltf.compact import drop_words
 
 Json = dict[str, Any]
 
@@ -361,25 +362,18 @@ def _merge(
     for number, data in enumerate(buffers):
         if number in missing:
             continue
-        words = np.frombuffer(data + b"\0" * (-len(data) % 4), np.uint32)
-        drop = np.zeros(len(words), bool)
         # Leave views that exceed their buffer unchanged; see `dangling.py`.
         mine = [
             (index, holder, span)
             for index, holder in holders
             if holder.get("buffer") == number and (span := view_span(holder, len(data))) is not None
         ]
-        for index, _, (start, end) in mine:
-            if index in gone:
-                drop[-(-start // 4) : end // 4] = True
-        for index, _, (start, end) in mine:
-            if index not in gone:
-                drop[start // 4 : -(-end // 4)] = False
-        before = np.concatenate([[0], np.cumsum(drop, dtype=np.int64)])
+        dead = [span for index, _, span in mine if index in gone]
+        kept, before = drop_words(data, dead, [span for index, _, span in mine if index not in gone])
         for index, holder, (start, _) in mine:
             if index not in gone:
                 moved.append((holder, length + start - 4 * int(before[start // 4])))
-        chunks.append(words[~drop].tobytes() if drop.any() else words.tobytes())
+        chunks.append(kept)
         length += len(chunks[-1])
     for _, holder in holders:
         if holder.get("buffer") in missing:

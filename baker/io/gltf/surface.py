@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from baker.core.scene import SceneWarning
-from baker.io.gltf.extension import EXTENSIONS
 from baker.io.gltf.json import JsonObject
+from baker.io.gltf.known_extensions import extension_of
 
 # Albedo of a material whose reflection model is unknown, 0 to 1.
 UNKNOWN_ALBEDO = 0.5
@@ -89,7 +89,7 @@ def read_surface(material: JsonObject, name: str, warnings: list[SceneWarning]) 
 
 def _replaces(name: str) -> bool:
     """Return whether an extension may contain the base colour; if not, glTF's default white applies."""
-    extension = EXTENSIONS.get(name)
+    extension = extension_of(name)
     return extension is None or extension.replaces_colour
 
 

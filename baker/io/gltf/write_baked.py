@@ -115,7 +115,6 @@ def _rewrite(
 ) -> tuple[Packer, list[BakedUse], list[int]]:
     """Return a copy of the source document with lightmap uv, its baked primitives and the instance meshes."""
     document = copy.deepcopy(source.json)
-    _decompress_views(document, source)
     instance_mesh = _own_meshes(document, source.json, scene.instances)
     pieces = [
         piece
@@ -245,21 +244,6 @@ def _rewrite_target(
         return _rewrite_accessor(packer, source, index, row, bounds, False)
     except InputError:
         return packer.add_floats(np.zeros((len(row), 3), np.float32), bounds=bounds)
-
-
-def _decompress_views(document: Json, source: SourceDocument) -> None:
-    """Remove the meshopt extension from views whose buffer is readable and contains the uncompressed data."""
-    for _, view in objects(document, "bufferViews"):
-        for name in _COMPRESSED_VIEW:
-            if name in view.get("extensions", {}):
-                number = view.get("buffer")
-                if not is_index(number) or number in source.missing or number >= len(source.buffers):
-                    continue
-                if view.get("byteOffset", 0) + view["byteLength"] > len(source.buffers[number]):
-                    continue
-                del view["extensions"][name]
-                if not view["extensions"]:
-                    del view["extensions"]
 
 
 def embed_images(packer: Packer, source: SourceDocument) -> None:

@@ -18,7 +18,7 @@ from baker.core.source_mesh import SourceInstance, SourceMesh, SourceScene
 from baker.io.gltf.camera import read_cameras
 from baker.io.gltf.choose_scene import choose_scene
 from baker.io.gltf.document import GltfDocument, open_document
-from baker.io.gltf.extension import expand_document
+from baker.io.gltf.expand import expand_document
 from baker.io.gltf.instancing import refuse_broken
 from baker.io.gltf.json import JsonObject
 from baker.io.gltf.light import read_light

@@ -1,0 +1,123 @@
+"""Decodes buffer views that are compressed with EXT_meshopt_compression or KHR_meshopt_compression.
+
+A view whose uncompressed data is in the file as well (a fallback buffer) is not decoded.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baker.core.errors import InputError
+from baker.io.gltf.decoded import DecodedData, remove_extension
+from baker.io.gltf.document import GltfDocument
+from baker.io.gltf.json import JsonObject
+from baker.io.gltf.packer import view_span
+
+if TYPE_CHECKING:
+    from baker.io.meshopt.stream import Layout
+
+MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+
+
+def decode_views(document: GltfDocument) -> GltfDocument:
+    """Decode all compressed views.
+
+    Parameters
+    ----------
+    document : GltfDocument
+        Its JSON is changed in place.
+
+    Returns
+    -------
+    GltfDocument
+        The document with plain views. Views that cannot be decoded keep their extension, and their errors are
+        in `data_faults`.
+    """
+    decoded = DecodedData(document)
+    found = False
+    for view in document.root.children("bufferViews"):
+        try:
+            names = [name for name in MESHOPT if view.extension(name) is not None]
+        except InputError as error:
+            decoded.faults[view.where] = error
+            continue
+        for name in names:
+            found = True
+            try:
+                _replace(document, view, name, decoded)
+            except InputError as error:
+                decoded.faults[view.where] = error
+    return decoded.finish(MESHOPT) if found or decoded.faults else document
+
+
+def _has_fallback(document: GltfDocument, view: JsonObject) -> bool:
+    """Return whether the uncompressed data of a view is in the file."""
+    number = view.value.get("buffer")
+    if not isinstance(number, int) or not 0 <= number < len(document.buffers):
+        return False
+    return number not in document.buffer_faults and (
+        view_span(view.value, len(document.buffers[number])) is not None
+    )
+
+
+def _replace(document: GltfDocument, view: JsonObject, name: str, decoded: DecodedData) -> None:
+    """Remove the extension of a view, and decode its data into `decoded` unless there is a fallback."""
+    extension = view.extension(name)
+    assert extension is not None
+    fallback = _has_fallback(document, view)
+    try:
+        number = extension.index("buffer", len(document.buffers), "buffers")
+        source, offset = _source(document, extension, number)
+        if not fallback:
+            decoded.place(view.value, _decode(view, extension, source, decoded))
+        decoded.drop(number, offset, len(source))
+    except InputError:
+        if not fallback:
+            raise
+    remove_extension(view.value, name)
+
+
+def _decode(
+    view: JsonObject, extension: JsonObject, source: NDArray[np.uint8], decoded: DecodedData
+) -> NDArray[np.uint8]:
+    """Return the elements of a view as (N,) uint8."""
+    # Numba takes longer to import than most files take to load.
+    from baker.io.meshopt.stream import Layout, StreamError, decode_stream
+
+    layout = Layout(
+        extension.string("mode"),
+        extension.string("filter", "NONE"),
+        extension.integer("count", minimum=1),
+        extension.integer("byteStride", minimum=1),
+    )
+    _check_size(view, extension, layout, decoded)
+    try:
+        return decode_stream(source, layout)
+    except StreamError as error:
+        extension.fail(f"{error}; export the file again")
+
+
+def _source(document: GltfDocument, extension: JsonObject, number: int) -> tuple[NDArray[np.uint8], int]:
+    """Return the compressed bytes of a view, (N,) uint8, and their offset in the buffer."""
+    if number in document.buffer_faults:
+        raise document.buffer_faults[number]
+    buffer = document.buffers[number]
+    offset, length = extension.integer("byteOffset", 0), extension.integer("byteLength", minimum=1)
+    if offset + length > len(buffer):
+        extension.fail(f"bytes {offset} to {offset + length} lie outside its buffer of {len(buffer)} bytes")
+    return np.frombuffer(buffer, np.uint8, length, offset), offset
+
+
+def _check_size(view: JsonObject, extension: JsonObject, layout: Layout, decoded: DecodedData) -> None:
+    """Raise if the decoded size differs from that of the view, or exceeds the size of a file."""
+    size, expected = layout.count * layout.stride, view.integer("byteLength", minimum=1)
+    if size != expected:
+        extension.fail(
+            f"{layout.count} elements of {layout.stride} bytes are not the {expected} bytes of the view; "
+            "export the file again"
+        )
+    if not decoded.has_room(size):
+        extension.fail(f"decoding its {size} bytes would exceed the largest size of a scene, 4 GiB")
