@@ -72,7 +72,7 @@ def _replace(document: GltfDocument, view: JsonObject, name: str, decoded: Decod
         number = extension.index("buffer", len(document.buffers), "buffers")
         source, offset = _source(document, extension, number)
         if not fallback:
-            decoded.place(view.value, _decode(view, extension, source, decoded))
+            decoded.append(view.value, _decode(view, extension, source, decoded))
         decoded.drop(number, offset, len(source))
     except InputError:
         if not fallback:
@@ -113,10 +113,10 @@ def _source(document: GltfDocument, extension: JsonObject, number: int) -> tuple
 
 def _check_size(view: JsonObject, extension: JsonObject, layout: Layout, decoded: DecodedData) -> None:
     """Raise if the decoded size differs from that of the view, or exceeds the size of a file."""
-    size, expected = layout.count * layout.stride, view.integer("byteLength", minimum=1)
+    size, expected = layout.elements * layout.stride, view.integer("byteLength", minimum=1)
     if size != expected:
         extension.fail(
-            f"{layout.count} elements of {layout.stride} bytes are not the {expected} bytes of the view; "
+            f"{layout.elements} elements of {layout.stride} bytes are not the {expected} bytes of the view; "
             "export the file again"
         )
     if not decoded.has_room(size):

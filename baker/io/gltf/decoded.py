@@ -43,7 +43,7 @@ class DecodedData:
         """Return whether `size` more bytes may be decoded."""
         return self.length + size <= LARGEST
 
-    def place(self, view: Json, data: NDArray[np.uint8]) -> None:
+    def append(self, view: Json, data: NDArray[np.uint8]) -> None:
         """Append (N,) uint8 to the new buffer, and let a view refer to it."""
         self._left.add(view.get("buffer"))
         view["buffer"], view["byteOffset"], view["byteLength"] = self._number, self.length, len(data)

@@ -42,8 +42,8 @@ def _read_group(source, position, end, bits, plane, first):
     for k in range(GROUP):
         packed = np.int64(source[position + k // per_byte])
         # One bit: the first value is in the lowest bit. Two and four bits: it is in the highest bits.
-        place = k % per_byte
-        shift = place if bits == 1 else 8 - bits - place * bits
+        rank = k % per_byte
+        shift = rank if bits == 1 else 8 - bits - rank * bits
         value = (packed >> shift) & escape
         if value == escape:
             if body >= end:
@@ -78,14 +78,8 @@ def _read_plane(source, position, end, mode, count, plane, first):
     for group in range(groups):
         code = (np.int64(source[header + group // 4]) >> (2 * (group % 4))) & 3
         # Bits: version 0 has 0 2 4 8, control mode 0 has 0 1 2 4, and control mode 1 has 1 2 4 8.
-        if mode == 1:
-            bits = 1 << code
-        elif code == 0:
-            bits = 0
-        elif mode == 0:
-            bits = 1 << (code - 1)
-        else:
-            bits = 1 << code
+        power = code - 1 if mode == 0 else code
+        bits = 0 if code == 0 and mode != 1 else 1 << power
         position = _read_group(source, position, end, bits, plane, first + GROUP * group)
         if position < 0:
             return -1

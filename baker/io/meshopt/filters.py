@@ -42,8 +42,8 @@ def _quaternion(data: NDArray[np.uint8], stride: int) -> None:
     w = np.sqrt(np.maximum(one * (one + one) - (x * x + (y * y + z * z)), np.float32(0.0)))
     scale = _QUATERNION / one
     rounded = np.stack([_rounded(part * scale) for part in (w, x, y, z)], axis=1)
-    place = (np.arange(4) - (last[:, None] & 3)) % 4
-    element[:] = np.take_along_axis(rounded, place, axis=1)
+    source = (np.arange(4) - (last[:, None] & 3)) % 4
+    element[:] = np.take_along_axis(rounded, source, axis=1)
 
 
 def _exponential(data: NDArray[np.uint8], stride: int) -> None:

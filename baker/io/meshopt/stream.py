@@ -32,14 +32,15 @@ class Layout(NamedTuple):
         ATTRIBUTES, TRIANGLES or INDICES.
     filter : str
         A name in `FILTERS`, or NONE.
-    count : int
+    elements : int
+        Number of elements.
     stride : int
         Bytes of an element.
     """
 
     mode: str
     filter: str
-    count: int
+    elements: int
     stride: int
 
 
@@ -55,7 +56,7 @@ def decode_stream(source: NDArray[np.uint8], layout: Layout) -> NDArray[np.uint8
 
     Returns
     -------
-    (count x stride,) uint8
+    (elements x stride,) uint8
         The elements.
 
     Raises
@@ -66,14 +67,14 @@ def decode_stream(source: NDArray[np.uint8], layout: Layout) -> NDArray[np.uint8
     _check_layout(layout)
     if not len(source) or source[0] not in _HEADERS[layout.mode]:
         raise StreamError(f"the compressed data is no stream of the mode {layout.mode}")
-    if len(source) < _least(layout, int(source[0]) & 1):
+    if len(source) < _shortest(layout, int(source[0]) & 1):
         raise StreamError(REASONS[TOO_SHORT])
     if layout.mode == "ATTRIBUTES":
-        out = np.zeros(layout.count * layout.stride, np.uint8)
+        out = np.zeros(layout.elements * layout.stride, np.uint8)
         version = int(source[0]) & 1
-        status = decode_attributes(source, layout.count, layout.stride, version, out)
+        status = decode_attributes(source, layout.elements, layout.stride, version, out)
     else:
-        index = np.zeros(layout.count, np.uint16 if layout.stride == 2 else np.uint32)
+        index = np.zeros(layout.elements, np.uint16 if layout.stride == 2 else np.uint32)
         decode = decode_triangles if layout.mode == "TRIANGLES" else decode_indices
         status, out = decode(source, index), index.view(np.uint8)
     if status != DONE:
@@ -104,7 +105,7 @@ def _check_layout(layout: Layout) -> None:
         raise StreamError(f"{count} indices are no whole number of triangles")
 
 
-def _least(layout: Layout, version: int) -> int:
+def _shortest(layout: Layout, version: int) -> int:
     """Return the size of the shortest stream with this layout, bytes."""
     mode, _, count, stride = layout
     if mode == "TRIANGLES":
@@ -115,5 +116,5 @@ def _least(layout: Layout, version: int) -> int:
     blocks = -(-count // step)
     tail = max(24, stride + stride // 4) if version else max(32, stride)
     # Version 1 has at least two bits for each byte of an element; version 0 has a byte for each four groups.
-    least = blocks * (stride // 4) if version else stride * (-(-count // (4 * GROUP)))
-    return 1 + least + tail
+    body = blocks * (stride // 4) if version else stride * (-(-count // (4 * GROUP)))
+    return 1 + body + tail

@@ -62,7 +62,7 @@ def test_changed_bytes_never_read_outside_the_stream():
         for at in rng.integers(len(changed), size=3):
             changed[at] = rng.integers(256)
         try:
-            assert len(decode_stream(changed, layout)) == layout.count * layout.stride
+            assert len(decode_stream(changed, layout)) == layout.elements * layout.stride
         except StreamError:
             refused += 1
     assert refused > len(STREAMS)
