@@ -25,6 +25,9 @@ def _read_group(source, position, end, bits, plane, first):
     """Decode 16 differences of `bits` bits into `plane`; return the next position, or -1 if data is missing.
 
     A value with all bits set means that the difference follows as a byte.
+
+    source : (N,) uint8, the stream; its planes are before the position `end`
+    plane : (8192,) uint8, out: 16 differences from index `first` on
     """
     if bits == 0:
         for k in range(GROUP):
@@ -58,7 +61,9 @@ def _read_group(source, position, end, bits, plane, first):
 def _read_plane(source, position, end, mode, count, plane, first):
     """Decode the differences of one byte of `count` elements; return the next position, or -1.
 
+    source : (N,) uint8, the stream; its planes are before the position `end`
     mode : -1 version 0; 0 to 3 control mode of version 1
+    plane : (8192,) uint8, out: the differences from index `first` on
     """
     if mode == 2:
         for k in range(count):
@@ -88,7 +93,12 @@ def _read_plane(source, position, end, mode, count, plane, first):
 
 @inner
 def _add_bytes(plane, step, count, previous, byte, stride, out, base):
-    """Channel mode 0: add zigzag-coded differences of one byte of each element."""
+    """Channel mode 0: add zigzag-coded differences of one byte of each element.
+
+    plane : (8192,) uint8, differences of the block; those of byte b of all elements begin at b x `step`
+    previous : (256,) uint8, in and out: the last element before the block, and of the block
+    out : (N,) uint8, out: decoded elements; the block begins at element `base`
+    """
     value = np.int64(previous[byte])
     for k in range(count):
         code = np.int64(plane[byte * step + k])
@@ -99,7 +109,12 @@ def _add_bytes(plane, step, count, previous, byte, stride, out, base):
 
 @inner
 def _add_words(plane, step, count, previous, byte, stride, out, base):
-    """Channel mode 1: add zigzag-coded differences of a 16-bit number of each element."""
+    """Channel mode 1: add zigzag-coded differences of a 16-bit number of each element.
+
+    plane : (8192,) uint8, differences of the block; those of byte b of all elements begin at b x `step`
+    previous : (256,) uint8, in and out: the last element before the block, and of the block
+    out : (N,) uint8, out: decoded elements; the block begins at element `base`
+    """
     value = np.int64(previous[byte]) | np.int64(previous[byte + 1]) << 8
     for k in range(count):
         code = np.int64(plane[byte * step + k]) | np.int64(plane[(byte + 1) * step + k]) << 8
@@ -113,7 +128,12 @@ def _add_words(plane, step, count, previous, byte, stride, out, base):
 
 @inner
 def _mix_words(plane, step, count, previous, byte, turn, stride, out, base):
-    """Channel mode 2: exclusive or with rotated 32-bit numbers."""
+    """Channel mode 2: exclusive or with rotated 32-bit numbers.
+
+    plane : (8192,) uint8, differences of the block; those of byte b of all elements begin at b x `step`
+    previous : (256,) uint8, in and out: the last element before the block, and of the block
+    out : (N,) uint8, out: decoded elements; the block begins at element `base`
+    """
     value = np.int64(0)
     for part in range(4):
         value |= np.int64(previous[byte + part]) << (8 * part)

@@ -27,7 +27,11 @@ _POSITION, _NEXT, _LAST, _EDGES, _VERTICES = range(5)
 
 @inner
 def _read_number(source, end, state):
-    """Return a number of one to five bytes with seven bits each, or -1 if data is missing."""
+    """Return a number of one to five bytes with seven bits each, or -1 if data is missing.
+
+    source : (N,) uint8, the stream; its data is before the position `end`
+    state : (5,) int64, in and out; see `_state`
+    """
     number = np.int64(0)
     for k in range(5):
         if state[_POSITION] >= end:
@@ -48,7 +52,11 @@ def _unfold(code):
 
 @inner
 def _read_free(source, end, state):
-    """Read a vertex that is stored relative to the last free one; return -1 if data is missing."""
+    """Read a vertex that is stored relative to the last free one; return -1 if data is missing.
+
+    source : (N,) uint8, the stream; its data is before the position `end`
+    state : (5,) int64, in and out; see `_state`
+    """
     code = _read_number(source, end, state)
     if code < 0:
         return np.int64(-1)
@@ -58,6 +66,10 @@ def _read_free(source, end, state):
 
 @inner
 def _new_vertex(state):
+    """Return the next vertex that no triangle has used.
+
+    state : (5,) int64, in and out; see `_state`
+    """
     vertex = state[_NEXT]
     state[_NEXT] = (vertex + 1) & _MASK
     return vertex
@@ -65,12 +77,22 @@ def _new_vertex(state):
 
 @inner
 def _push_vertex(queue, state, vertex):
+    """Append a vertex to the latest ones.
+
+    queue : (16,) int64, in and out: the latest vertices
+    state : (5,) int64, in and out; see `_state`
+    """
     queue[state[_VERTICES] & 15] = vertex
     state[_VERTICES] += 1
 
 
 @inner
 def _push_edge(queue, state, a, b):
+    """Append an edge to the latest ones.
+
+    queue : (16, 2) int64, in and out: the latest edges
+    state : (5,) int64, in and out; see `_state`
+    """
     queue[state[_EDGES] & 15, 0] = a
     queue[state[_EDGES] & 15, 1] = b
     state[_EDGES] += 1
@@ -78,7 +100,12 @@ def _push_edge(queue, state, a, b):
 
 @inner
 def _third_vertex(source, end, state, vertices, code):
-    """Return the vertex that completes a known edge, or -1 if data is missing."""
+    """Return the vertex that completes a known edge, or -1 if data is missing.
+
+    source : (N,) uint8, the stream; its data is before the position `end`
+    state : (5,) int64, in and out; see `_state`
+    vertices : (16,) int64, in and out: the latest vertices
+    """
     if 0 < code < _BEFORE_LAST:
         return vertices[(state[_VERTICES] - 1 - code) & 15]
     if code == 0:
@@ -95,6 +122,9 @@ def _third_vertex(source, end, state, vertices, code):
 def _corner(source, end, state, vertices, pushed, code):
     """Return a corner of a triangle without a known edge, or -1 if data is missing.
 
+    source : (N,) uint8, the stream; its data is before the position `end`
+    state : (5,) int64, in and out; see `_state`
+    vertices : (16,) int64, the latest vertices
     pushed : number of vertices in the queue before the triangle
     """
     if code == 0:
