@@ -26,7 +26,7 @@ QUICK = ["--resolution", "64", "--samples", "1", "--bounces", "1", "--no-denoise
 
 
 def odd_scene(path: Path, *, candela: float = 10.0) -> Path:
-    """Write a floor and a light with odd names; a third object has no area along an axis."""
+    """Write a floor, a light, and a copy of the floor that is scaled to a line; their names are odd."""
     b = GltfBuilder()
     paint = b.add("materials", {"name": f"paint {ODD}"})
     mesh = b.mesh(b.primitive(QUAD, QUAD_TRIANGLE, material=paint), name=f"mesh {ODD}")

@@ -18,7 +18,8 @@ from baker.io.file_lock import is_alive
 ROOT = Path(__file__).parents[2]
 SCENE = ROOT / "assets" / "cornell.glb"
 FAKE = Path(__file__).with_name("fake_baker.py")
-# Sends Ctrl-C to the process itself at the import of a module, then starts as the installed command does.
+# A Python program that starts like the installed command, but sends itself SIGINT when it imports the module
+# that its first argument names.
 INTERRUPTED_AT = """
 import os, signal, sys
 module = sys.argv.pop(1)

@@ -204,7 +204,7 @@ def paint_at(s, t):
 
 
 def lit_pixels(page):
-    """Return (drawn, expected) colours at `PLACES` of both squares, without smooth lookup."""
+    """Return (drawn, expected) colours at `PLACES` of both squares, without bilinear lookup."""
     page.press("t")
     spots, expected = [], []
     for s, t in PLACES:

@@ -98,7 +98,7 @@ def test_all_triangles_or_none_may_be_chosen(case, chosen):
 
 
 def test_shared_edges_do_not_leak_between_the_geometries():
-    """Rays hit exactly the edge between a triangle with a hit filter and a triangle without one."""
+    """Rays aimed at the edge between a triangle with a hit filter and one without a hit filter all hit."""
     position = np.float32([[0, 0, 0], [1, 0, 0.1], [1, 1, 0], [0, 1, 0.1]])
     nothing = np.zeros(N, np.uint8)
     see = HitFilter(np.array([True, False]), refuse.address, nothing.ctypes.data, nothing)
