@@ -9,7 +9,7 @@ from gltf_builder import GltfBuilder
 
 
 def compress(builder: GltfBuilder, name: str = "EXT_meshopt_compression", **placeholder: Any) -> GltfBuilder:
-    """Return a builder in which all accessors' views are compressed; buffer 1 is a placeholder.
+    """Return a builder in which the views of all accessors are compressed; buffer 1 is a placeholder.
 
     `placeholder` : further members of the placeholder buffer
     """
@@ -51,7 +51,7 @@ def compress(builder: GltfBuilder, name: str = "EXT_meshopt_compression", **plac
 
 
 def pack_attributes(data: bytes, stride: int) -> bytes:
-    """Return a stream of version 0 with all differences stored as bytes; at most 256 elements."""
+    """Return a stream of version 0 with one block, at most 256 elements; differences are stored as bytes."""
     element = np.frombuffer(data, np.uint8).reshape(-1, stride).astype(np.int16)
     assert len(element) <= min(256, 8192 // stride // 16 * 16)
     groups = -(-len(element) // 16)
@@ -63,7 +63,7 @@ def pack_attributes(data: bytes, stride: int) -> bytes:
 
 
 def pack_indices(data: bytes, stride: int) -> bytes:
-    """Return a stream of the mode INDICES with all indices relative to the first of its two sequences."""
+    """Return a stream of the mode INDICES. It stores each index as the difference from the previous one."""
     out, last = bytearray(b"\xd1"), 0
     for index in np.frombuffer(data, f"<u{stride}").tolist():
         delta, last = index - last, index

@@ -72,7 +72,7 @@ def _add_export(game, folder, name):
 
     The import script extends a class that only the editor has, so the class is replaced. This build of Godot
     has one thread and cannot read EXR files, because its EXR reader starts threads. Therefore the pixels of
-    The pixels of EXR files are also added as raw half floats.
+    EXR files are also added as raw half floats.
     """
     for path in (p for p in folder.rglob("*") if p.is_file()):
         data, file = path.read_bytes(), f"{name}/{path.relative_to(folder).as_posix()}"

@@ -1,4 +1,4 @@
-"""Files with meshopt-compressed views load, and are written, as their uncompressed versions."""
+"""Files with meshopt-compressed views give the same scene and `scene.glb` as uncompressed files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Decodes streams that npm's meshoptimizer encoded (`tests/engines/meshopt_streams.mjs`), and broken ones."""
+"""Streams that npm's meshoptimizer encoded are decoded, and broken streams are refused."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from meshopt_writer import pack_indices
 
 from baker.io.meshopt.stream import Layout, StreamError, decode_stream
 
-# Printed by `node meshopt_streams.mjs NODE_MODULES 60 1 30`.
+# The output of `node tests/engines/meshopt_streams.mjs NODE_MODULES 60 1 30`.
 STREAMS = json.loads(Path(__file__).with_name("streams.json").read_text("utf-8"))
 
 
@@ -41,7 +41,7 @@ def test_streams_of_another_length_are_refused():
         for end in {0, 1, len(encoded) // 2, len(encoded) - 1}:
             with pytest.raises(StreamError):
                 decode_stream(encoded[:end], layout)
-        # The head stays as it is, and the tail of the stream moves.
+        # The first byte twice: the stream is one byte longer, but its head is valid.
         longer = np.concatenate([encoded[:1], encoded[:1], encoded[1:]])
         assert not is_equal_to(longer, layout, encoded)
 
@@ -97,7 +97,7 @@ def test_impossible_layouts_are_named(layout, words):
 
 
 def test_the_table_of_vertex_pairs_is_checked():
-    """The specification forbids 15 in the table; it would read a vertex from elsewhere."""
+    """Code 15, an index that is stored in the data, is forbidden in the table by the specification."""
     valid = np.frombuffer(b"\xe1\xf0" + bytes(16), np.uint8)
     assert decode_stream(valid, Layout("TRIANGLES", "NONE", 3, 2)).view("<u2").tolist() == [0, 1, 2]
     changed = np.frombuffer(b"\xe1\xf0\xf0" + bytes(15), np.uint8)
