@@ -16,8 +16,8 @@ from baker.io.gltf.known_extensions import known_extensions
 HEAD = """\
 # Scene files
 
-`baker` reads {formats}. The result of every format is the same `scene.glb`. `docs/make_formats_page.py`
-generates this page from the code.
+`baker` reads {formats}. A bake writes the scene as `scene.glb`, whatever the format of the input.
+`docs/make_formats_page.py` generates this page from the code.
 
 ## Textures
 
@@ -59,7 +59,7 @@ neither block light nor get texels, and their lights are off.
 - *used in the bake*: what it changes in the lightmap.
 - *in scene.glb*: whether `scene.glb` and fixed files contain it.
 - *refused*: a file that lists the extension in `extensionsRequired` is refused with "the file requires the
-  extension NAME, " and this text. Without a text, such files are read.
+  extension NAME, " and this text. If the column is empty, such files are read.
 
 A file that requires any other extension is refused with the text "{unknown}".
 If a file only uses such an extension, the bake ignores it with the warning `extension-ignored`, and
