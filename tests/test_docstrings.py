@@ -66,6 +66,11 @@ def public_names():
     return names
 
 
+def is_overload(node):
+    """Return whether a function only declares types for a checker; its implementation has the docstring."""
+    return any(isinstance(each, ast.Name) and each.id == "overload" for each in node.decorator_list)
+
+
 def indexed_arguments(node):
     """Return the arguments of a kernel that its body indexes, in the order of the signature."""
     indexed = {
@@ -115,7 +120,7 @@ def faults(package):
         module = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
         where = path.relative_to(ROOT).as_posix()
         for node in tree.body:
-            if not isinstance(node, ast.FunctionDef):
+            if not isinstance(node, ast.FunctionDef) or is_overload(node):
                 continue
             if is_kernel(node):
                 words = set(re.findall(r"\w+", ast.get_docstring(node) or ""))

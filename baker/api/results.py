@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING, Unpack, overload
 
 from baker.api.arguments import of_the_api, path_of
 from baker.core.progress import Progress, silent
@@ -268,11 +268,38 @@ def render(
     return picture
 
 
+@overload
+def view(
+    bake: str | Path | BakeResult,
+    *,
+    port: int = 0,
+    three: str | Path | None = None,
+    browser: bool = True,
+    export: None = None,
+) -> ViewServer: ...
+
+
+@overload
+def view(
+    bake: str | Path | BakeResult,
+    *,
+    port: int = 0,
+    three: str | Path | None = None,
+    browser: bool = True,
+    export: str | Path,
+) -> Path: ...
+
+
 @of_the_api
 def view(
-    bake: str | Path | BakeResult, *, port: int = 0, three: str | Path | None = None, browser: bool = True
-) -> ViewServer:
-    """Serve a local web page that shows a finished bake, in a thread of this process.
+    bake: str | Path | BakeResult,
+    *,
+    port: int = 0,
+    three: str | Path | None = None,
+    browser: bool = True,
+    export: str | Path | None = None,
+) -> ViewServer | Path:
+    """Serve a local web page that shows a finished bake, in a thread of this process, or write the page.
 
     Parameters
     ----------
@@ -284,20 +311,24 @@ def view(
         Copy of three.js to use: its file, or the folder in which npm installed it.
     browser : bool
         Whether to open the page in the default browser.
+    export : str or Path, optional
+        Folder into which the page is written as static files, for any web server. Nothing is served then. A
+        folder that exists is replaced if it contains only an exported page.
 
     Returns
     -------
-    ViewServer
-        The running server. `url` is its address; `shutdown()` and `server_close()` stop it.
+    ViewServer or Path
+        The running server. `url` is its address; `shutdown()` and `server_close()` stop it. With `export`,
+        the path of the written `index.html`.
 
     Raises
     ------
     InputError
         If the folder contains no bake, or `three` is not a copy of three.js.
     SettingsError
-        If `port` is not an integer from 0 to 65535.
+        If `port` is not an integer from 0 to 65535, or `export` is not a folder for the page.
     ResourceError
-        If the port is in use, or three.js is not installed.
+        If the port is in use, three.js is not installed, or the page cannot be written.
 
     Examples
     --------
@@ -306,6 +337,8 @@ def view(
     True
     >>> server.shutdown(), server.server_close()
     (None, None)
+    >>> baker.view("out", export="page").name
+    'index.html'
     """
     import threading
     import webbrowser
@@ -313,12 +346,17 @@ def view(
     from baker.api.folders import folder_of
     from baker.core.errors import SettingsError
     from baker.io.bake.read_bake import read_bake
+    from baker.viewer.export import checked_folder, export_page
     from baker.viewer.script import find_three
     from baker.viewer.server import make_server
 
     if not (isinstance(port, int) and 0 <= port <= 65535):
         raise SettingsError(f"`port` is no number from 0 to 65535 (was {port!r})", object="port")
     script = find_three(None if three is None else path_of(three, "three"))
+    if export is not None:
+        folder = checked_folder(path_of(export, "export"))
+        export_page(read_bake(folder_of(bake)), script, folder)
+        return folder / "index.html"
     server = make_server(read_bake(folder_of(bake)), script, port=port)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     if browser:

@@ -7,13 +7,13 @@ of a node cannot make the spacing of its mesh's vertices finer.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.atlas import Atlas
-from baker.core.origin import column_medians
 from baker.core.scene import Scene, SceneWarning
 
 # Spacing of float32 positions, as a share of a texel's side, above which an object is reported.
@@ -64,14 +64,13 @@ def coarse_objects(scene: Scene, texel: NDArray[np.float64]) -> CoarseObjects | 
     """
     if not scene.instances:
         return None
-    extents = [_median_and_extent(mesh.position) for mesh in scene.meshes]
-    stored, spacing, distance = (np.zeros(len(scene.instances)) for _ in range(3))
-    for k, instance in enumerate(scene.instances):
-        linear, shift = instance.world_from_object[:3, :3], instance.world_from_object[:3, 3] - scene.origin
-        middle, extent = extents[instance.mesh]
-        stored[k] = float((np.abs(linear) @ _float32_spacing(extent)).max())
-        distance[k] = float(np.abs(linear @ middle + shift).max())
-        spacing[k] = max(stored[k], float(_float32_spacing(distance[k])))
+    middle, extent = _medians_and_extents([mesh.position for mesh in scene.meshes])
+    mesh = np.array([instance.mesh for instance in scene.instances])
+    matrix = np.stack([instance.world_from_object for instance in scene.instances])
+    linear, shift = matrix[:, :3, :3], matrix[:, :3, 3] - scene.origin
+    stored = np.einsum("kij,kj->ki", np.abs(linear), _float32_spacing(extent)[mesh]).max(axis=1)
+    distance = np.abs(np.einsum("kij,kj->ki", linear, middle[mesh]) + shift).max(axis=1)
+    spacing = np.maximum(stored, _float32_spacing(distance))
     share = spacing / texel
     worst = int(share.argmax())
     if not share[worst] > COARSE:
@@ -81,7 +80,7 @@ def coarse_objects(scene: Scene, texel: NDArray[np.float64]) -> CoarseObjects | 
         f"which is {_metres(texel[worst])} wide"
     )
     if stored[worst] == spacing[worst]:
-        largest = float(extents[scene.instances[worst].mesh][1].max())
+        largest = float(extent[mesh[worst]].max())
         text = f"90 % of its vertices are stored with coordinates of up to {largest:.3g}, {ends}"
         fix = "move the distance into the node's translation, so that the mesh lies around its own origin"
     else:
@@ -115,12 +114,36 @@ def coarse_warnings(scene: Scene, atlas: Atlas) -> list[SceneWarning]:
     return [SceneWarning("coarse-positions", f"{found.text}; {found.fix}{more}", name)]
 
 
-def _median_and_extent(position: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return, by axis, the median (3,) of vertices and the 0.9 quantile (3,) of absolute coordinates."""
-    some = position[:: max(1, len(position) // _VERTICES)].astype(np.float64)
-    if not len(some):
-        return np.zeros(3), np.zeros(3)
-    return column_medians(some), np.quantile(np.abs(some), 1.0 - _OUTLIERS, axis=0)
+def _medians_and_extents(
+    positions: Sequence[NDArray[np.float32]],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return, for N meshes and by axis, the median of vertices and the 0.9 quantile of absolute coordinates.
+
+    positions : N arrays (V, 3) float32. The results are (N, 3) float64, and 0 for meshes without vertices.
+    """
+    some = [position[:: max(1, len(position) // _VERTICES)] for position in positions]
+    count = np.array([len(rows) for rows in some])
+    middle, extent = np.zeros((2, len(some), 3))
+    # Sort small meshes together, because the calls for a single mesh take longer than sorting it.
+    batch = np.cumsum(count) // _VERTICES
+    for number in np.unique(batch):
+        mine = np.flatnonzero((batch == number) & (count > 0))
+        if not len(mine):
+            continue
+        rows = np.concatenate([some[k] for k in mine]).astype(np.float64)
+        owner = np.repeat(np.arange(len(mine)), count[mine])
+        n, start = count[mine], np.cumsum(count[mine]) - count[mine]
+        for axis in range(3):
+            value = rows[:, axis]
+            ordered = value[np.lexsort((value, owner))]
+            middle[mine, axis] = (ordered[start + (n - 1) // 2] + ordered[start + n // 2]) / 2.0
+            size = np.abs(value)
+            ordered = size[np.lexsort((size, owner))]
+            at = (1.0 - _OUTLIERS) * (n - 1)
+            low = at.astype(np.int64)
+            below, above = ordered[start + low], ordered[start + np.minimum(low + 1, n - 1)]
+            extent[mine, axis] = below + (at - low) * (above - below)
+    return middle, extent
 
 
 def _float32_spacing(value: NDArray[np.float64] | float) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tiny_scenes import Quad, quad_scene
 
-from baker.core.precision import coarse_objects
+from baker.core.precision import _VERTICES, _medians_and_extents, coarse_objects
 
 
 def floor(at, by="node", size=2.0, scale=1.0):
@@ -76,3 +76,18 @@ def test_two_objects_far_apart_cannot_both_be_fine():
 def test_objects_without_texels_are_not_reported():
     assert coarse_objects(floor(1e5, "vertices"), np.array([np.inf])) is None
     assert coarse_objects(replace(floor(0), instances=()), np.zeros(0)) is None
+
+
+def test_medians_and_extents_of_many_meshes():
+    random = np.random.default_rng(0)
+    sizes = [1, 2, 3, 0, 7, 1000, 40_000, 70_000, 5, 0, 1]
+    positions = [random.normal(0, 10, (n, 3)).astype(np.float32) for n in sizes]
+    middle, extent = _medians_and_extents(positions)
+    for k, position in enumerate(positions):
+        some = position[:: max(1, len(position) // _VERTICES)].astype(np.float64)
+        if not len(some):
+            assert not middle[k].any()
+            assert not extent[k].any()
+            continue
+        np.testing.assert_allclose(middle[k], np.median(some, axis=0), rtol=1e-12)
+        np.testing.assert_allclose(extent[k], np.quantile(np.abs(some), 0.9, axis=0), rtol=1e-12)

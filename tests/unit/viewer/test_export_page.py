@@ -11,6 +11,7 @@ from io import StringIO
 import pytest
 from view_bake import make_bake
 
+import baker
 from baker.cli.app import run
 from baker.core.errors import ResourceError, SettingsError
 from baker.io.bake.read_bake import read_bake
@@ -154,3 +155,14 @@ def test_the_command_writes_the_page_and_ends(bake, tmp_path):
     assert (told["files"], told["bytes"]) == (len(files), sum(map(len, files.values())))
     (tmp_path / "file").write_text("")
     assert run(["view", str(bake.folder), "--export", str(tmp_path / "file"), "--json"], out=StringIO()) == 2
+
+
+def test_python_exports_the_same_page(bake, tmp_path):
+    assert baker.view(bake.folder, export=tmp_path / "page") == tmp_path / "page" / "index.html"
+    export_page(bake, find_three(None), tmp_path / "same")
+    assert content(tmp_path / "page") == content(tmp_path / "same")
+    (tmp_path / "page" / "mine.txt").write_text("mine")
+    with pytest.raises(SettingsError, match=r"mine\.txt"):
+        baker.view(bake.folder, export=tmp_path / "page")
+    with pytest.raises(SettingsError, match="export"):
+        baker.view(bake.folder, export=3)
