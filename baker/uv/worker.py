@@ -1,44 +1,17 @@
 """The worker process that runs chart jobs. It can be killed while xatlas is busy.
 
-The process receives messages on stdin and answers on stdout. A message is a length in 8 bytes, little-endian,
-followed by an npz file of that length.
+The process receives messages (`baker.core.messages`) on stdin and answers on stdout.
 """
 
 from __future__ import annotations
 
-import io
 import signal
 import sys
-from typing import IO, Any
+from typing import IO
 
-import numpy as np
-from numpy.typing import NDArray
-
+from baker.core.messages import read_message, write_message
 from baker.core.parent_death import end_with_parent
 from baker.uv.xatlas_charts import ChartJob, FlatCharts, cut_charts
-
-
-def write_message(stream: IO[bytes], **array: NDArray[Any]) -> None:
-    """Write a message with named arrays to a stream."""
-    buffer = io.BytesIO()
-    np.savez(buffer, allow_pickle=False, **array)
-    data = buffer.getvalue()
-    stream.write(len(data).to_bytes(8, "little"))
-    stream.write(data)
-    stream.flush()
-
-
-def read_message(stream: IO[bytes]) -> dict[str, NDArray[Any]] | None:
-    """Read a message from a stream and return its arrays by name; None if the stream has ended."""
-    head = stream.read(8)
-    if len(head) < 8:
-        return None
-    size = int.from_bytes(head, "little")
-    data = stream.read(size)
-    if len(data) < size:
-        return None
-    with np.load(io.BytesIO(data), allow_pickle=False) as message:
-        return {name: message[name] for name in message.files}
 
 
 def send_job(stream: IO[bytes], job: ChartJob) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.errors import InputError
-from baker.io.gltf.decoded import DecodedData, remove_extension
+from baker.io.gltf.decoded import DecodedData, is_listed, remove_extension
 from baker.io.gltf.document import GltfDocument
 from baker.io.gltf.json import JsonObject
 from baker.io.gltf.packer import view_span
@@ -50,7 +50,8 @@ def decode_views(document: GltfDocument) -> GltfDocument:
                 _replace(document, view, name, decoded)
             except InputError as error:
                 decoded.faults[view.where] = error
-    return decoded.finish(MESHOPT) if found or decoded.faults else document
+    found = found or bool(decoded.faults) or is_listed(document.root.value, MESHOPT)
+    return decoded.finish(MESHOPT) if found else document
 
 
 def _has_fallback(document: GltfDocument, view: JsonObject) -> bool:

@@ -38,7 +38,7 @@ def break_dangling(document: Json, buffers: tuple[bytes, ...], missing: frozense
         for holder in (view, *extensions_of(view)):
             if isinstance(holder, dict) and "buffer" in holder:
                 _check_buffer(holder, buffers, missing)
-    for holder in _with_key(document, "bufferView"):
+    for holder in holders_with(document, "bufferView"):
         _check_index(holder, "bufferView", views)
     accessors = dict(objects(document, "accessors"))
     for accessor in accessors.values():
@@ -62,14 +62,27 @@ def _check_index(holder: Json, key: str, known: dict[int, Json]) -> None:
         holder[key] = NOWHERE
 
 
-def _with_key(node: Any, key: str) -> Iterator[Json]:
-    """Yield all objects with a key, except in extras."""
+def holders_with(node: Any, key: str) -> Iterator[Json]:
+    """Yield all objects with a key, except in extras.
+
+    Parameters
+    ----------
+    node : Any
+        A JSON value.
+    key : str
+        The key.
+
+    Yields
+    ------
+    dict
+        Objects inside `node`, which may be `node` itself.
+    """
     if isinstance(node, dict):
         if key in node:
             yield node
         node = [value for name, value in node.items() if name != "extras"]
     for value in node if isinstance(node, list) else ():
-        yield from _with_key(value, key)
+        yield from holders_with(value, key)
 
 
 def _parts(accessor: Json, views: dict[int, Json]) -> Iterator[tuple[Json, bool]]:

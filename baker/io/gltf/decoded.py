@@ -135,6 +135,25 @@ def remove_extension(holder: Json, name: str) -> None:
             del holder["extensions"]
 
 
+def is_listed(root: Json, names: tuple[str, ...]) -> bool:
+    """Return whether the document lists one of the extensions as used or required.
+
+    Parameters
+    ----------
+    root : dict
+        The document.
+    names : tuple of str
+        Names of extensions.
+
+    Returns
+    -------
+    bool
+        Whether a list contains one of them.
+    """
+    listed = (*root.get("extensionsUsed", []), *root.get("extensionsRequired", []))
+    return any(name in listed for name in names)
+
+
 def _forget(root: Json, name: str) -> None:
     """Remove an extension from the document's lists of extensions and from its buffers."""
     for key in ("extensionsUsed", "extensionsRequired"):

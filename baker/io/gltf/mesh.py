@@ -20,7 +20,6 @@ from baker.io.gltf.material import MaterialReader
 from baker.io.gltf.texture import MAX_TEXCOORDS
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
-_DRACO = "KHR_draco_mesh_compression"
 
 
 def read_primitives(
@@ -52,7 +51,7 @@ def read_primitives(
     ------
     InputError
         For malformed primitives: a missing POSITION, arrays of different length, an index out of range. For
-        data that exists only in Draco-compressed form.
+        compressed data that could not be decoded.
     """
     arrays: list[SourcePrimitive] = []
     warnings: list[SceneWarning] = []
@@ -103,7 +102,8 @@ def _primitive(
 ) -> SourcePrimitive:
     accessors = document.root.children("accessors")
     attributes = primitive.child("attributes")
-    _refuse_draco(primitive, attributes, accessors)
+    if primitive.where in document.data_faults:
+        raise document.data_faults[primitive.where]
     if "POSITION" not in attributes:
         primitive.fail("the primitive has no POSITION")
     at = attributes.index("POSITION", len(accessors), "accessors")
@@ -185,15 +185,6 @@ def _unreadable(
             )
             found.append(SceneWarning("broken-attribute", message, mesh))
     return found
-
-
-def _refuse_draco(primitive: JsonObject, attributes: JsonObject, accessors: list[JsonObject]) -> None:
-    """Raise if the primitive's data exists only Draco-compressed, without an uncompressed copy."""
-    if primitive.extension(_DRACO) is None:
-        return
-    used = [attributes.index(key, len(accessors), "accessors") for key in attributes.value]
-    if not all("bufferView" in accessors[k] or "sparse" in accessors[k] for k in used):
-        primitive.fail(f"the data is compressed with {_DRACO}, which is not understood; export without it")
 
 
 def _unmarked_integers(document: GltfDocument, attributes: JsonObject) -> bool:

@@ -18,7 +18,6 @@ from baker.io.gltf.packer import Json, objects
 # Extensions of primitives and meshes that neither contain vertex data nor depend on the order of vertices.
 _HARMLESS = frozenset({"KHR_materials_variants"})
 _FLOAT = 5126
-_COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
 def read_columns(source: SourceDocument, primitive: Json) -> dict[str, NDArray[np.uint8]]:
@@ -80,9 +79,6 @@ def why_locked(source: SourceDocument, mesh: int, primitive: Json) -> str:
     malformed = _malformed(document, primitive)
     if malformed:
         return f"its {malformed} is malformed"
-    for name in _COMPRESSED:
-        if name in primitive.get("extensions", {}) or _views_have(document, primitive, name):
-            return f"it is compressed with {name}"
     if primitive.get("targets"):
         return "it has morph targets"
     skinned = any("skin" in node and node.get("mesh") == mesh for _, node in objects(document, "nodes"))
@@ -136,13 +132,3 @@ def _item(items: Any, index: Any) -> Json | None:
         return None
     item = items[index]
     return item if isinstance(item, dict) and isinstance(item.get("extensions", {}), dict) else None
-
-
-def _views_have(document: dict[str, Any], primitive: Json, name: str) -> bool:
-    views = document.get("bufferViews", [])
-    indices = [primitive["indices"]] if "indices" in primitive else []
-    for index in (*primitive["attributes"].values(), *indices):
-        view = document["accessors"][index].get("bufferView")
-        if view is not None and name in views[view].get("extensions", {}):
-            return True
-    return False

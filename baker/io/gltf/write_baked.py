@@ -8,7 +8,6 @@ from __future__ import annotations
 import copy
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
@@ -25,9 +24,6 @@ from baker.io.gltf.dangling import break_dangling
 from baker.io.gltf.packer import Json, Packer, is_index, objects, primitive_accessors
 from baker.io.gltf.uri import UriError, is_data, read_uri
 from baker.io.scene_folder import OutsideName, SceneFolder
-
-_COMPRESSED_PRIMITIVE = "KHR_draco_mesh_compression"
-_COMPRESSED_VIEW = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 _IMAGE_HEADS = {
     b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg",
@@ -140,9 +136,6 @@ def _rewrite(
         moved = None if piece.kept else _rewrite_primitive(packer, source, piece, ao=ao)
         uses.append(BakedUse(piece.primitive, piece.page, moved))
     embed_images(packer, source)
-    for name in (_COMPRESSED_PRIMITIVE, *_COMPRESSED_VIEW):
-        if not _mentions(document, name):
-            _forget_extension(document, name)
     return packer, uses, instance_mesh
 
 
@@ -193,13 +186,10 @@ def _rewrite_primitive(packer: Packer, source: SourceDocument, piece: _Piece, *,
         sets = [int(name[9:]) for name in attributes if name.startswith("TEXCOORD_") and name[9:].isdigit()]
         moved = max([1, *sets]) + 1
         attributes[f"TEXCOORD_{moved}"] = old
-    compressed = _COMPRESSED_PRIMITIVE in piece.source.get("extensions", {})
     written = {}
     for name, index in attributes.items():
         try:
-            written[name] = _rewrite_accessor(
-                packer, source, index, piece.row, name == "POSITION", compressed
-            )
+            written[name] = _rewrite_accessor(packer, source, index, piece.row, name == "POSITION")
         except InputError:
             # Leave unreadable attributes out; the importer has added a warning.
             if name in ("POSITION", "NORMAL", "COLOR_0"):
@@ -217,22 +207,14 @@ def _rewrite_primitive(packer: Packer, source: SourceDocument, piece: _Piece, *,
     # Strips and fans are written as triangle lists, the default mode.
     if piece.primitive.get("mode", 4) != 4:
         del piece.primitive["mode"]
-    if compressed:
-        del piece.primitive["extensions"][_COMPRESSED_PRIMITIVE]
-        if not piece.primitive["extensions"]:
-            del piece.primitive["extensions"]
     return moved
 
 
 def _rewrite_accessor(
-    packer: Packer, source: SourceDocument, index: int, row: NDArray[np.int32], bounds: bool, compressed: bool
+    packer: Packer, source: SourceDocument, index: int, row: NDArray[np.int32], bounds: bool
 ) -> int:
     data = gather_rows(source.json, source.buffers, index, row)
-    accessor = source.json["accessors"][index]
-    if compressed and "bufferView" not in accessor:
-        message = "its data is only there Draco-compressed; decompress the file first"
-        raise InputError(message, object=f"accessor {index}")
-    return packer.add_rows(data, accessor, bounds=bounds)
+    return packer.add_rows(data, source.json["accessors"][index], bounds=bounds)
 
 
 def _rewrite_target(
@@ -241,7 +223,7 @@ def _rewrite_target(
     """Write an attribute of a morph target; write zeros if it cannot be read."""
     bounds = name == "POSITION"
     try:
-        return _rewrite_accessor(packer, source, index, row, bounds, False)
+        return _rewrite_accessor(packer, source, index, row, bounds)
     except InputError:
         return packer.add_floats(np.zeros((len(row), 3), np.float32), bounds=bounds)
 
@@ -290,17 +272,3 @@ def _write_version(document: Json) -> None:
     extras = document.setdefault("asset", {"version": "2.0"}).setdefault("extras", {})
     if isinstance(extras, dict):
         extras["baker"] = {"version": VERSION}
-
-
-def _mentions(node: Any, name: str) -> bool:
-    if isinstance(node, dict):
-        return name in node or any(_mentions(value, name) for value in node.values())
-    return isinstance(node, list) and any(_mentions(value, name) for value in node)
-
-
-def _forget_extension(document: Json, name: str) -> None:
-    for key in ("extensionsUsed", "extensionsRequired"):
-        if name in document.get(key, []):
-            document[key] = [other for other in document[key] if other != name]
-            if not document[key]:
-                del document[key]
