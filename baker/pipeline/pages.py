@@ -141,7 +141,8 @@ def convergence_warnings(status: NDArray[np.uint8]) -> list[SceneWarning]:
         return []
     message = (
         f"{number(100 * noisy / surface)} % of the texels did not converge: their standard error before"
-        f" denoising is above {100 * UNCONVERGED:.0f} % of their value; raise `quality` or `samples`"
+        f" denoising is above {100 * UNCONVERGED:.0f} % of their value; look for blotches there (key 5 in the"
+        " viewer shows these texels), and raise `quality` if you see any"
     )
     return [SceneWarning("not-converged", message)]
 
