@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tomllib
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,7 @@ def sources(*folders):
         yield from sorted((ROOT / folder).rglob("*.py"))
 
 
+@cache
 def tree_of(path):
     return ast.parse(path.read_text("utf-8"), str(path))
 
@@ -49,6 +51,7 @@ def name_of(path):
     return path.relative_to(ROOT).as_posix()
 
 
+@cache
 def imported(path):
     """Return the top-level package names of all imports in a file, including imports in functions."""
     names = set()
@@ -112,7 +115,7 @@ def test_no_two_classes_have_one_name():
     found = Counter(
         node.name
         for path in sources("baker")
-        for node in ast.parse(path.read_text("utf-8")).body
+        for node in tree_of(path).body
         if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
     )
     assert {name: count for name, count in found.items() if count > 1} == {}

@@ -108,12 +108,17 @@ def _root(error: NDArray[np.float64], known: NDArray[np.float64], z: float, *, f
     `error` and `known` (n,) are relative errors and standard errors.
     """
     low, high = 0.0, _LARGEST
+    n, square, known_square = len(error), error**2, known**2
 
     def beyond(b: float) -> bool:
-        variance = (b * known) ** 2 + 1e-30 if factor else b * b + known**2
-        psi = np.minimum(error**2 / variance, _PSI_BOUND)
-        spread = float(psi.std()) / math.sqrt(len(psi))
-        return float(psi.mean()) - z * spread > _EXPECTED
+        variance = (b * known) ** 2 + 1e-30 if factor else b * b + known_square
+        psi = np.minimum(square / variance, _PSI_BOUND)
+        # Sums take a third of the time of the methods `mean` and `std`, and give the same bits.
+        mean = float(np.add.reduce(psi)) / n
+        if z == 0.0:
+            return mean > _EXPECTED
+        apart = psi - mean
+        return mean - z * (math.sqrt(float(np.add.reduce(apart * apart)) / n) / math.sqrt(n)) > _EXPECTED
 
     if not beyond(low):
         return 0.0

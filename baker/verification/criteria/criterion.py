@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -56,12 +57,12 @@ class ChannelData:
     unverified: UnverifiedArea
     noisy: NDArray[np.bool_]
 
-    @property
+    @cached_property
     def texels(self) -> NDArray[np.bool_]:
         """Return (n,) bool: the points that are randomly chosen texels."""
         return np.asarray(self.points.kind == TEXEL)
 
-    @property
+    @cached_property
     def interior(self) -> NDArray[np.bool_]:
         """Return (n,) bool: points outside gaps, not tilted, in texels covered to at least `_MIN_COVERED`.
 
@@ -71,7 +72,7 @@ class ChannelData:
         covered = points.surface.area * points.valid_share >= _MIN_COVERED
         return np.asarray(~points.gap & covered & ~self.tilted)
 
-    @property
+    @cached_property
     def tilted(self) -> NDArray[np.bool_]:
         """Return (n,) bool: the points whose shading normal is tilted against the face normal (`_MAX_BELOW`).
 
@@ -83,22 +84,22 @@ class ChannelData:
         cosine = (surface.normal * surface.face_normal).sum(axis=2).mean(axis=1)
         return np.asarray(0.5 * (1.0 - cosine) > _MAX_BELOW)
 
-    @property
+    @cached_property
     def edges(self) -> NDArray[np.bool_]:
         """Return (n,) bool: the points at edges."""
         return np.asarray(self.points.kind == EDGE)
 
-    @property
+    @cached_property
     def outliers(self) -> NDArray[np.bool_]:
         """Return (n,) bool: the points that are texels which differ from all their neighbours."""
         return np.asarray(self.points.kind == OUTLIER)
 
-    @property
+    @cached_property
     def steep(self) -> NDArray[np.bool_]:
         """Return (n,) bool: the points that are texels with the largest gradients of light."""
         return np.asarray(self.points.kind == STEEP)
 
-    @property
+    @cached_property
     def scarce(self) -> NDArray[np.bool_]:
         """Return (n,) bool: the points that are additional texels of light levels with few random texels."""
         return np.asarray(self.points.kind == SCARCE)
