@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import naive
 import numpy as np
 import pytest
@@ -16,7 +18,6 @@ N = 60
 U, PRIM = HIT_U - NG_X, PRIM_ID - NG_X
 
 
-@cfunc(types.void(types.voidptr))
 def refuse(arguments):
     """Reject hits with u < 0.3 on triangles whose byte in the table is not 0."""
     given = carray(arguments, (6,), np.int64)
@@ -28,6 +29,12 @@ def refuse(arguments):
     for lane in range(n):
         if valid[lane] == -1 and table[words[PRIM * n + lane]] and hit[U * n + lane] < np.float32(0.3):
             valid[lane] = 0
+
+
+@cache
+def compiled():
+    """Return the compiled filter, which must exist as long as Embree has its address."""
+    return cfunc(types.void(types.voidptr))(refuse)
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +49,7 @@ def case():
     truth = np.array([first_that_counts(position, triangle, refused, o, d) for o, d in
                       zip(origin, direction, strict=True)])  # fmt: skip
     table = refused.astype(np.uint8)
-    see = HitFilter(chosen, refuse.address, table.ctypes.data, table)
+    see = HitFilter(chosen, compiled().address, table.ctypes.data, table)
     return position, triangle, origin, direction, see, truth
 
 
@@ -85,7 +92,7 @@ def test_refused_hits_do_not_count(case, width):
 def test_all_triangles_or_none_may_be_chosen(case, chosen):
     position, triangle, origin, direction = case[:4]
     nothing = np.zeros(N, np.uint8)
-    all_or_none = HitFilter(np.full(N, chosen), refuse.address, nothing.ctypes.data, nothing)
+    all_or_none = HitFilter(np.full(N, chosen), compiled().address, nothing.ctypes.data, nothing)
     rays = RayScene(position, triangle, threads=1, hit_filter=all_or_none)
     plain = RayScene(position, triangle, threads=1)
     found, truth = (cast(scene, origin, direction) for scene in (rays, plain))
@@ -101,7 +108,7 @@ def test_shared_edges_do_not_leak_between_the_geometries():
     """Rays aimed at the edge between a triangle with a hit filter and one without a hit filter all hit."""
     position = np.float32([[0, 0, 0], [1, 0, 0.1], [1, 1, 0], [0, 1, 0.1]])
     nothing = np.zeros(N, np.uint8)
-    see = HitFilter(np.array([True, False]), refuse.address, nothing.ctypes.data, nothing)
+    see = HitFilter(np.array([True, False]), compiled().address, nothing.ctypes.data, nothing)
     rays = RayScene(position, np.int32([[0, 1, 2], [0, 2, 3]]), threads=1, hit_filter=see)
     rng = np.random.default_rng(0)
     share = rng.uniform(0.01, 0.99, (4000, 1))
