@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import struct
 import zlib
-from html import escape
 from typing import Any
 
 import numpy as np
@@ -41,6 +40,9 @@ class Result:
         return printable(f"<{type(self).__name__}: {rows}>")
 
     def _repr_html_(self) -> str:
+        # Import here, because commands make no HTML, and the module has a large table.
+        from html import escape
+
         rows = "".join(
             f"<tr><th style='text-align:left'>{escape(str(name))}</th>"
             f"<td>{escape(printable(_words(value)))}</td></tr>"

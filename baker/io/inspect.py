@@ -13,11 +13,8 @@ from baker.core.encoding import encoding_of
 from baker.core.errors import InputError
 from baker.core.lightmap import TexelStatus
 from baker.core.scene import Scene
-from baker.io.bake.output_folder import MANIFEST_NAME, file_state
-from baker.io.bake.read_manifest import read_manifest
-from baker.io.bake.recovery import recover
+from baker.io.bake.recovery import MANIFEST_NAME, recover
 from baker.io.output_path import not_text
-from baker.io.png import decode_palette_png
 from baker.io.regular_file import read_regular
 
 if TYPE_CHECKING:
@@ -70,6 +67,9 @@ def inspect_path(path: Path | str, settings: LoadSettings | None = None) -> dict
 
 def _bake(folder: Path) -> dict[str, Any]:
     """Return the main entries of a manifest, and whether each file is as baked, changed or missing."""
+    from baker.io.bake.output_folder import file_state
+    from baker.io.bake.read_manifest import read_manifest
+
     manifest = read_manifest(folder)
     files = [
         {**entry, "state": file_state(folder / entry["file"], entry["sha256"])} for entry in manifest["files"]
@@ -97,6 +97,8 @@ def _bake(folder: Path) -> dict[str, Any]:
 
 def _status(path: Path) -> dict[str, Any] | None:
     """Count the texels of each status in a file such as `status_0.png`; return None for any other PNG."""
+    from baker.io.png import decode_palette_png
+
     try:
         data = read_regular(path)
         # Recognise the file by the text chunk `Legend`, which only status images have.
