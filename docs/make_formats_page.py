@@ -43,6 +43,15 @@ of the missing image. Images that an MTL file names are treated alike.
 - Unlit materials (`KHR_materials_unlit`) block light, and neither reflect nor emit light, because the colour
   of such materials usually contains light already. With `--unlit lit` they reflect their base colour like
   other materials, but still emit nothing.
+- Materials that transmit light (`KHR_materials_transmission`) are panes. Light passes a pane in a straight
+  line. At each crossing it is multiplied by transmission x base colour x (1 - F). F is the Fresnel
+  reflectance by Schlick, F0 + (1 - F0) (1 - cos)^5, with F0 from `KHR_materials_ior` (0.04 by default); the
+  reflected light is lost, because all surfaces reflect diffusely. The rest, 1 - transmission, reflects the
+  base colour. With `KHR_materials_volume`, each of the two crossings of a closed object also has half of
+  the attenuation of `thicknessFactor`, which colours the reflected light, too; without a thickness, the
+  attenuation has no effect. Roughness does not scatter the light, and the thickness texture is not read. AO
+  rays pass with the probability of the transmission. Alpha below 1 precedes transmission. A transmission
+  texture whose uv differ from those of the base colour texture is replaced by its mean.
 - `--variant NAME` bakes the materials of one variant (`KHR_materials_variants`). `scene.glb` keeps all
   variants and the materials that are shown without a variant.
 
@@ -52,6 +61,16 @@ of the missing image. Images that an MTL file names are treated alike.
 scene has the name `N`. The chosen scene becomes the default scene of `scene.glb`. `scene.glb` keeps the nodes
 of the other scenes, without lightmap uv. Nodes that `KHR_node_visibility` hides, and all nodes below them,
 neither block light nor get texels, and their lights are off.
+
+## Skins, morph targets and animations
+
+Skinned meshes have the pose that the joints have in the file; the matrix of their own node does not apply.
+Morph targets have the weights of the node, or else of the mesh. `--animation NAME` (or its number from 0)
+and `--time SECONDS` pose nodes, joints and morph targets as the animation does at that time, with STEP,
+LINEAR and CUBICSPLINE interpolation. Before the first key and after the last one, the value of that key
+applies. `scene.glb` keeps the animation and the pose of the file: show the pose of the bake to see objects
+where they were baked. Animations of other values (`KHR_animation_pointer`), such as the visibility of
+nodes, are not read.
 
 ## Extensions of glTF
 

@@ -87,6 +87,13 @@ class BakeKeywords(TypedDict, total=False):
     # Material variant of a glTF file; default: the materials without a variant.
     variant: str | None
 
+    # Name or number of the animation that poses a glTF scene; default with `time`: the first one.
+    animation: str | float | None
+
+    # Time of the animation that poses a glTF scene; default: the pose of the file, with `animation`
+    # 0.
+    time: float | None
+
     # Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.
     missing_textures: Literal["error", "white", "grey", "magenta"]
 
@@ -138,6 +145,8 @@ class AoKeywords(TypedDict, total=False):
     scale: float
     scene_name: str | float | None
     variant: str | None
+    animation: str | float | None
+    time: float | None
     missing_textures: Literal["error", "white", "grey", "magenta"]
     unlit: Literal["block", "lit"]
     allow_outside: bool
@@ -228,6 +237,13 @@ class LoadKeywords(TypedDict, total=False):
     # Material variant of a glTF file; default: the materials without a variant.
     variant: str | None
 
+    # Name or number of the animation that poses a glTF scene; default with `time`: the first one.
+    animation: str | float | None
+
+    # Time of the animation that poses a glTF scene; default: the pose of the file, with `animation`
+    # 0.
+    time: float | None
+
     # Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.
     missing_textures: Literal["error", "white", "grey", "magenta"]
 
@@ -292,6 +308,13 @@ class RenderKeywords(TypedDict, total=False):
 
     # Material variant of a glTF file; default: the materials without a variant.
     variant: str | None
+
+    # Name or number of the animation that poses a glTF scene; default with `time`: the first one.
+    animation: str | float | None
+
+    # Time of the animation that poses a glTF scene; default: the pose of the file, with `animation`
+    # 0.
+    time: float | None
 
     # Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.
     missing_textures: Literal["error", "white", "grey", "magenta"]

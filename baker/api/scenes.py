@@ -42,6 +42,11 @@ def load(path: str | Path, settings: LoadSettings | None = None, **keywords: Unp
             Name or number of the scene in a glTF file; default: the file's default scene.
         variant : str | None, default None
             Material variant of a glTF file; default: the materials without a variant.
+        animation : str | float | None, default None
+            Name or number of the animation that poses a glTF scene; default with `time`: the first one.
+        time : float | None, s, from 0, default None
+            Time of the animation that poses a glTF scene; default: the pose of the file, with `animation`
+            0.
         missing_textures : Literal["error", "white", "grey", "magenta"], default 'error'
             Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.
         unlit : Literal["block", "lit"], default 'block'

@@ -16,6 +16,10 @@ class ReadOptions:
         Name or number of the scene of a glTF file; None uses the default scene of the file.
     variant : str or None
         Name of the variant (KHR_materials_variants) whose materials are used; None uses none.
+    animation : str or None
+        Name or number of the animation that `time` refers to; None uses the first one.
+    time : float or None
+        Seconds from the start of the animation; None uses the pose that the nodes have in the file.
     missing_textures : str
         "error", or the colour of textures that cannot be read: "white", "grey" or "magenta".
     unlit : str
@@ -24,6 +28,8 @@ class ReadOptions:
 
     scene_name: str | None = None
     variant: str | None = None
+    animation: str | None = None
+    time: float | None = None
     missing_textures: str = "error"
     unlit: str = "block"
 

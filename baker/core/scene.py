@@ -73,6 +73,10 @@ class Material:
         Linear: `roughness` is multiplied by green, `metallic` by blue. Bakes do not read it.
     alpha_mode : str
         "OPAQUE", "MASK" or "BLEND".
+    reflectance : float or None
+        For a pane (KHR_materials_transmission), the share of light of normal incidence that its smooth
+        surface reflects, 0 to 1. The material is BLEND, and its alpha is the share that it does not transmit.
+        None for other materials.
     reflects : bool
         Whether the surface reflects light. If False, its albedo is 0 in a bake; `base_colour` is only the
         colour in which it is displayed.
@@ -89,6 +93,7 @@ class Material:
     metallic: float = 1.0
     roughness: float = 1.0
     metallic_roughness_texture: Texture | None = None
+    reflectance: float | None = None
     reflects: bool = True
 
 

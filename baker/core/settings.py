@@ -125,6 +125,21 @@ class CommonSettings(Settings):
         group=SCENE,
         metavar="NAME",
     )
+    animation: Text | None = setting(
+        None,
+        "Name or number of the animation that poses a glTF scene; default with `time`: the first one.",
+        group=SCENE,
+        metavar="NAME|N",
+    )
+    time: float | None = setting(
+        None,
+        "Time of the animation that poses a glTF scene; default: the pose of the file, with `animation` 0.",
+        unit="s",
+        ge=0,
+        allow_inf_nan=False,
+        group=SCENE,
+        metavar="SECONDS",
+    )
     missing_textures: Literal["error", "white", "grey", "magenta"] = setting(
         "error",
         "Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.",

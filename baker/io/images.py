@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import warnings
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,6 +93,28 @@ def stand_in(colour: str) -> NDArray[np.float32]:
         Linear RGB, and alpha 1.
     """
     return np.array([[[*STAND_INS[colour], 1.0]]], np.float32)
+
+
+def resized(image: NDArray[Any], width: int, height: int) -> NDArray[Any]:
+    """Return an image with more texels, each of which has the value of the nearest texel of the image.
+
+    Parameters
+    ----------
+    image : (H, W, C)
+        Pixels.
+    width, height : int
+        The new size, texels.
+
+    Returns
+    -------
+    (height, width, C)
+        Pixels of the same type.
+    """
+    if image.shape[:2] == (height, width):
+        return image
+    row = (np.arange(height) * image.shape[0]) // height
+    column = (np.arange(width) * image.shape[1]) // width
+    return np.asarray(image[row[:, None], column])
 
 
 def _check_size(width: int, height: int, file: str, object: str) -> None:

@@ -17,6 +17,8 @@ class LoadSettings(Settings):
     scale: float = same_setting(BakeSettings, "scale")
     scene_name: Text | None = same_setting(BakeSettings, "scene_name")
     variant: str | None = same_setting(BakeSettings, "variant")
+    animation: Text | None = same_setting(BakeSettings, "animation")
+    time: float | None = same_setting(BakeSettings, "time")
     missing_textures: Literal["error", "white", "grey", "magenta"] = same_setting(
         BakeSettings, "missing_textures"
     )

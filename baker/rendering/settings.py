@@ -78,6 +78,8 @@ class RenderSettings(Settings):
     sky_strength: float = same_setting(BakeSettings, "sky_strength")
     scene_name: Text | None = same_setting(BakeSettings, "scene_name")
     variant: str | None = same_setting(BakeSettings, "variant")
+    animation: Text | None = same_setting(BakeSettings, "animation")
+    time: float | None = same_setting(BakeSettings, "time")
     missing_textures: Literal["error", "white", "grey", "magenta"] = same_setting(
         BakeSettings, "missing_textures"
     )

@@ -24,6 +24,7 @@ from baker.kernels.alpha import (
 from baker.kernels.shading import Shading
 from baker.kernels.textures import TexturePack, value_limits
 from baker.kernels.transmittance import TransmittanceTable
+from baker.shading.kernels.pane import PANE
 from baker.topology.unique_rows import first_equal, unique_rows
 from baker.trace.embree import HitFilter
 
@@ -63,12 +64,19 @@ def build_alpha(
     blocks = np.array(
         [m.alpha_cutoff if m.alpha_mode == "MASK" else 1.0 for m in scene.materials], np.float32
     )
+    # Column CUTOFF of BLEND materials, see `kernels.alpha` and `kernels.pane`.
+    blend_code = np.array(
+        [-1.0 if m.reflectance is None else PANE - m.reflectance for m in scene.materials], np.float32
+    )
     candidate = np.flatnonzero(np.isin(mode, ("MASK", "BLEND"))[geometry.material])
     if not len(candidate):
         return no_alpha()
     material = geometry.material[candidate]
     factor = np.array([m.base_colour[3] for m in scene.materials], np.float32)
     alpha = factor[material][:, None] * _corner_alpha(scene, geometry, candidate)
+    # The alpha of a pane is the share that it does not transmit, which vertex colours do not change.
+    pane = blend_code[material] < -1.0
+    alpha[pane] = factor[material[pane]][:, None]
     lowest = np.array([1.0 if k < 0 else _lowest_alpha(pack, int(k)) for k in base_texture], np.float32)
     chosen = np.flatnonzero(alpha.min(axis=1) * lowest[material] < blocks[material])
     if not len(chosen):
@@ -84,7 +92,7 @@ def build_alpha(
         row[:, UV_EDGE_2 : UV_EDGE_2 + 2] = uv[:, 2] - uv[:, 0]
     row[:, ALPHA] = alpha[:, 0]
     row[:, ALPHA_EDGE_1 : ALPHA_EDGE_2 + 1] = alpha[:, 1:] - alpha[:, :1]
-    row[:, CUTOFF] = np.where(mode[material] == "MASK", blocks[material], np.float32(-1.0))
+    row[:, CUTOFF] = np.where(mode[material] == "MASK", blocks[material], blend_code[material])
     row[:, TEXTURE] = base_texture[material]
     blend = np.flatnonzero(row[:, CUTOFF] < 0)
     row[blend, SURFACE] = _connected_surface(geometry, triangle[blend])

@@ -41,8 +41,10 @@ def build_transmittance_table(shading: Shading) -> TransmittanceTable | None:
     )
     highest = corner_alpha.max(axis=1) * np.array([highest for _, highest in limits], np.float32)[material]
     white = (colour.min(axis=1) * darkest >= 1.0).all(axis=1)
-    # Leave out triangles whose alpha is 0 everywhere, because their transmittance is 1 for any colour.
-    has_alpha = (alpha.row[:, CUTOFF] < 0) & (highest > 0)
+    # Leave out other triangles whose alpha is 0 everywhere: their transmittance is 1 for any colour.
+    # A pane has a colour where its alpha is 0, too.
+    pane = alpha.row[:, CUTOFF] < -1.0
+    has_alpha = (alpha.row[:, CUTOFF] < 0) & ((highest > 0) | pane)
     chosen = np.flatnonzero(has_alpha)
     if not len(chosen):
         return None
@@ -54,7 +56,7 @@ def build_transmittance_table(shading: Shading) -> TransmittanceTable | None:
     row[:, COLOUR : COLOUR + 3] = corner[:, 0]
     row[:, COLOUR_EDGE_1 : COLOUR_EDGE_1 + 3] = corner[:, 1] - corner[:, 0]
     row[:, COLOUR_EDGE_2 : COLOUR_EDGE_2 + 3] = corner[:, 2] - corner[:, 0]
-    return TransmittanceTable(slot, row, bool((has_alpha & ~white).any()))
+    return TransmittanceTable(slot, row, bool((has_alpha & (pane | ~white)).any()))
 
 
 def transmittance_filter(shading: Shading, table: TransmittanceTable | None) -> HitFilter | None:

@@ -124,6 +124,8 @@ OTHER = {
     "scale": ("0.01", 0.01),
     "scene_name": ("1", "1"),
     "variant": ("red", "red"),
+    "animation": ("walk", "walk"),
+    "time": ("1.5", 1.5),
     "missing_textures": ("grey", "grey"),
     "unlit": ("lit", "lit"),
     "seed": ("7", 7),

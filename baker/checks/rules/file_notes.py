@@ -20,13 +20,15 @@ NOTES = {
     "missing-mtl": ("warning", "put the material library beside the scene"),
     "missing-texcoord": ("warning", "export the texture coordinates that the material reads"),
     "missing-texture": ("warning", "put the image beside the scene, or take the texture off the material"),
-    "morphed": ("info", "bake the shape that is shown most, or leave the object out"),
+    "animation-pointer": ("info", "nothing to do, if the state of the file is what is to be baked"),
+    "morphed": ("info", "nothing to do, if the shape of these weights is what is to be baked"),
     "no-material": ("info", "name a material for these faces"),
     "not-triangles": ("info", "nothing to do, if points and lines are not to be baked"),
     "odd-indices": ("warning", "export the mesh again: its index buffer is cut off"),
-    "several-scenes": ("info", "export the scene wanted by itself"),
+    "several-scenes": ("info", "choose a scene with `scene_name`"),
     "skinned": ("info", "nothing to do, if the pose of the file is what is to be baked"),
-    "transmission": ("warning", "give the material alphaMode BLEND and an alpha below 1"),
+    "transmission": ("warning", "look at the light behind the surface"),
+    "unlit": ("info", "nothing to do, if the picture of the material contains its light"),
     "unknown-material": ("warning", "export the material with a base colour"),
     "up-and-scale-ignored": ("info", "leave `up` and `scale` away for glTF"),
 }
@@ -39,7 +41,8 @@ def file_note(context: CheckContext) -> Iterator[RawFinding]:
     The key `note` has the code of the importer's warning. Examples are:
 
     - unknown extensions, and materials of an unknown model;
-    - skinned meshes, which are baked in the pose of the file, and morph targets, which are not applied;
+    - skinned meshes and morph targets, which are baked in one pose, and animations that change other values;
+    - unlit materials, which reflect no light, and materials whose transmission is not used completely;
     - primitives of points and lines;
     - several scenes in one file;
     - missing texture coordinates or material libraries;

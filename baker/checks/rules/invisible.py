@@ -71,6 +71,8 @@ def _sentence(materials: list[Material]) -> str:
 
 def _seen(facts: MeshFacts, number: int, material: Material) -> bool:
     """Return whether any good face with this material, whose index is `number`, may be visible somewhere."""
+    if material.reflectance is not None:
+        return True
     least_alpha = material.alpha_cutoff if material.alpha_mode == "MASK" else LEAST_ALPHA
     face = facts.good[facts.material[facts.good] == number]
     alpha = material.base_colour[3] * _vertex_alpha(facts)[facts.triangle[face]]

@@ -11,7 +11,12 @@ from baker.io.gltf.node import Placed, place_nodes
 
 
 def choose_scene(
-    document: GltfDocument, asked: str | None, warnings: list[SceneWarning], *, lenient: bool
+    document: GltfDocument,
+    nodes: list[JsonObject],
+    asked: str | None,
+    warnings: list[SceneWarning],
+    *,
+    lenient: bool,
 ) -> tuple[int | None, list[Placed]]:
     """Return the index of the chosen scene (None if the file has no scenes), and the scene's nodes.
 
@@ -21,6 +26,8 @@ def choose_scene(
     ----------
     document : GltfDocument
         The document; changed in place.
+    nodes : list of JsonObject
+        The nodes of the document, in the pose in which they are placed.
     asked : str or None
         Name or number of a scene; None chooses the default scene of the file, or else the first one.
     warnings : list of SceneWarning
@@ -36,7 +43,7 @@ def choose_scene(
         If the file has no scene of that name or number.
     """
     root = document.root
-    scenes, nodes = root.children("scenes"), root.children("nodes")
+    scenes = root.children("scenes")
     if asked is not None:
         number = named_index(scenes, asked, "scene", root.file)
         root.value["scene"] = number

@@ -17,6 +17,7 @@ from baker.io.gltf.document import GltfDocument
 from baker.io.gltf.json import JsonObject
 from baker.io.gltf.surface import read_surface
 from baker.io.gltf.texture import TextureReader
+from baker.io.gltf.transmission import TRANSMISSION, as_pane, transmits
 from baker.io.gltf.unread import unreadable_textures
 from baker.io.gltf.variant import material_of, variant_number
 
@@ -110,13 +111,6 @@ class MaterialReader:
         mode = material.string("alphaMode", "OPAQUE")
         if mode not in _ALPHA:
             material.fail(f"'{mode[:20]}' is none of {', '.join(_ALPHA)}", "alphaMode")
-        through = material.extension("KHR_materials_transmission")
-        if mode == "OPAQUE" and through is not None and through.number("transmissionFactor", 0.0) > 0:
-            message = (
-                f"the material '{name}' transmits light (KHR_materials_transmission), which a bake does not "
-                "read: it blocks light; let light through with alphaMode BLEND and an alpha below 1"
-            )
-            self.warnings.append(SceneWarning("transmission", message, name))
         black = unlit and self._options.unlit == "block"
         if black:
             self._unlit.append(name)
@@ -126,11 +120,13 @@ class MaterialReader:
         read = {(surface.holder.where, surface.texture)} if coloured else set()
         if emits:
             read.add((material.where, "emissiveTexture"))
+        if not unlit and transmits(material):
+            read.add((f"{material.where}.extensions.{TRANSMISSION}", "transmissionTexture"))
         texture = partial(self._textures.read, name=name, warnings=self.warnings)
         base_texture = texture(surface.holder, surface.texture, needed=coloured)
         emission_texture = None if unlit else texture(material, "emissiveTexture", needed=emits)
         self.warnings += unreadable_textures(self._document, material, name, read, self.reported)
-        return Material(
+        made = Material(
             name=name,
             base_colour=surface.colour,
             base_colour_texture=base_texture,
@@ -148,6 +144,7 @@ class MaterialReader:
             ),
             reflects=not black,
         )
+        return made if unlit else as_pane(material, made, self._textures, self.warnings)
 
 
 def _name(material: JsonObject, number: int) -> str:

@@ -63,9 +63,6 @@ def read_primitives(
         if mode < _TRIANGLES:
             skipped += 1
             continue
-        if primitive.children("targets"):
-            message = f"primitive {i} has morph targets; its base shape is baked"
-            warnings.append(SceneWarning("morphed", message, name))
         arrays.append(_primitive(document, primitive, i, mode, materials, lenient))
         if _unmarked_integers(document, primitive.child("attributes")):
             message = (

@@ -30,11 +30,19 @@ _FAR = 8.0
 
 
 class Poser:
-    """Computes the pose of skinned meshes from the node matrices of a document."""
+    """Computes the pose of skinned meshes from the matrices of nodes.
 
-    def __init__(self, document: GltfDocument) -> None:
+    Parameters
+    ----------
+    document : GltfDocument
+        The document.
+    nodes : sequence of JsonObject
+        The nodes of the document, in the pose in which they are placed.
+    """
+
+    def __init__(self, document: GltfDocument, nodes: Sequence[JsonObject]) -> None:
         self._document = document
-        self._nodes = document.root.children("nodes")
+        self._nodes = nodes
         self._parent: dict[int, int] | None = None
 
     def pose(

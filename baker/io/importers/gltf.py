@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from baker.core.errors import InputError
 from baker.core.scene import Instance, Mesh, PunctualLight, Scene, SceneWarning, SourceDocument
 from baker.core.source_mesh import SourceInstance, SourceMesh, SourceScene
+from baker.io.gltf.animation import posed_nodes
 from baker.io.gltf.camera import read_cameras
 from baker.io.gltf.choose_scene import choose_scene
 from baker.io.gltf.document import GltfDocument, open_document
@@ -24,6 +25,7 @@ from baker.io.gltf.json import JsonObject
 from baker.io.gltf.light import read_light
 from baker.io.gltf.material import MaterialReader
 from baker.io.gltf.mesh import read_primitives
+from baker.io.gltf.morph import has_targets, morphed, weights_of
 from baker.io.gltf.node import Placed
 from baker.io.gltf.skin import Poser
 from baker.io.gltf.unread import unneeded_faults
@@ -35,7 +37,8 @@ from baker.topology.triangle_check import LARGEST_COORDINATE
 # instance is flat and is left out.
 _FLATTEST = 1e-7
 
-# Key of a built mesh: the index of the mesh, and the index of the node if the node has a skin, else None.
+# Key of a built mesh: the index of the mesh, and the index of the node if the node has a skin or weights of
+# morph targets, else None.
 _Key = tuple[int, int | None]
 
 
@@ -78,9 +81,14 @@ def import_gltf(source: SceneFile) -> Scene:
     if source.up != "y" or source.scale != 1.0:
         message = "up axis and scale are not applied: glTF is +Y up and in metres"
         warnings.append(SceneWarning("up-and-scale-ignored", message))
-    number, placed = choose_scene(document, source.options.scene_name, warnings, lenient=source.lenient)
+    nodes = posed_nodes(document, source.options, warnings)
+    number, placed = choose_scene(
+        document, nodes, source.options.scene_name, warnings, lenient=source.lenient
+    )
     reader = MaterialReader(document, source.options, reflections=source.reflections)
-    meshes, instances, source_scene = _instances(document, placed, reader, warnings, lenient=source.lenient)
+    meshes, instances, source_scene = _instances(
+        document, placed, Poser(document, nodes), reader, warnings, lenient=source.lenient
+    )
     lights = _lights(placed, document, warnings, lenient=source.lenient)
     cameras = read_cameras(placed, document, warnings)
     warnings += [*reader.warnings, *reader.notes(), *unneeded_faults(document, reader.reported)]
@@ -118,6 +126,7 @@ def import_gltf(source: SceneFile) -> Scene:
 def _instances(
     document: GltfDocument,
     placed: list[Placed],
+    poser: Poser,
     reader: MaterialReader,
     warnings: list[SceneWarning],
     *,
@@ -125,7 +134,6 @@ def _instances(
 ) -> tuple[list[Mesh], list[Instance], SourceScene | None]:
     """Return the distinct meshes in use, the instances, and the source scene (None unless `lenient`)."""
     sources = document.root.children("meshes")
-    poser = Poser(document)
     built: dict[_Key, _Built] = {}
     users = _users(placed, sources)
     meshes: list[Mesh] = []
@@ -137,12 +145,17 @@ def _instances(
         refuse_broken(document, node.json)
         number = node.json.index("mesh", len(sources), "meshes")
         name = sources[number].string("name", f"mesh_{number}")
-        # A skinned mesh is transformed by its joints, not by its node's matrix: build a mesh for each node.
+        # A skinned mesh is transformed by its joints, not by its node's matrix, and nodes may have weights of
+        # morph targets. Build a mesh for each such node.
         key = _key(node, number)
         if key not in built:
             arrays, found = read_primitives(document, sources[number], name, reader, lenient=lenient)
+            if has_targets(sources[number]):
+                arrays = morphed(document, sources[number], arrays, weights_of(sources[number], node.json))
+                message = "the mesh has morph targets; it is baked with the weights of the file"
+                found.append(SceneWarning("morphed", message, name))
             posed = None
-            if key[1] is not None:
+            if "skin" in node.json:
                 arrays, posed = poser.pose(sources[number], arrays, node)
             mesh, defects = build_mesh(name, arrays, reader.materials)
             warnings += found + [_with_nodes(defect, users[key]) for defect in defects]
@@ -169,7 +182,7 @@ def _instances(
 
 def _key(node: Placed, number: int) -> _Key:
     """Return the key of the mesh that is built for a node with mesh `number`."""
-    return number, node.index if "skin" in node.json else None
+    return number, node.index if "skin" in node.json or "weights" in node.json else None
 
 
 def _users(placed: list[Placed], sources: list[JsonObject]) -> dict[_Key, list[str]]:

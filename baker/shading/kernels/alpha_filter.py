@@ -4,9 +4,10 @@
 A hit on a MASK triangle is accepted if alpha is at least the cutoff. A hit on a BLEND triangle of alpha a and
 colour c is accepted if a is 1, and rejected if a is 0. For other a, the ID of the ray decides:
 
-- Shadow rays (ID 1 to 16, the ray's number): `packets.BlendBuffers.transmittance` is multiplied by
-  T = (1 - a) lerp(1, c, a), and the hit is rejected. So Embree calls the filter for every crossing of the
-  ray, in any order. If the transmittance falls below `_DARK`, the hit is accepted, which blocks the ray.
+- Shadow rays (ID 1 to 16, the ray's number): `packets.BlendBuffers.transmittance` is multiplied by 1 - a and
+  by the colour of the passing light (`pane`), and the hit is rejected. So Embree calls the filter for every
+  crossing of the ray, in any order. If the transmittance falls below `_DARK`, the hit is accepted, which
+  blocks the ray.
 - Rays that pass BLEND surfaces (ID `packets.UNAWARE`): the hit is rejected.
 - Rays between points of a texel (ID `packets.SOLID`): the hit is accepted.
 - Other rays (ID 0): the hit is accepted with probability a. The random number is a hash of the bits of the
@@ -26,8 +27,9 @@ from baker.kernels.alpha import ROW_LENGTH as ALPHA_ROW_LENGTH
 from baker.kernels.alpha import SURFACE, AlphaTable, opacity
 from baker.kernels.sampling import hash_u32
 from baker.kernels.textures import MAX_LEVELS, TexturePack
-from baker.kernels.transmittance import ROW_LENGTH, TransmittanceTable, filter_colour_at, no_transmittance
+from baker.kernels.transmittance import ROW_LENGTH, TransmittanceTable, no_transmittance
 from baker.shading.kernels.edge_hits import crossed_before, on_edge
+from baker.shading.kernels.pane import cosine_of, is_pane, passed_colour_at
 from baker.trace.embree import HitFilter
 from baker.trace.jit import inner, larger, scratch
 from baker.trace.packets import (
@@ -135,14 +137,15 @@ def _let_through(arguments):
     for lane in range(n):
         if valid[lane] != -1:
             continue
-        # Accept the hit if the triangle is opaque there, reject it if it is fully transparent.
+        # Accept the hit if the triangle is opaque there, reject it if it is fully transparent. A pane of
+        # alpha 0 has a colour.
         prim = hit_words[_PRIM * n + lane]
         k = np.int64(slot[prim])
         b1, b2 = np.float64(hit[_U * n + lane]), np.float64(hit[_V * n + lane])
         share = opacity(row, k, pack, b1, b2)
         if share >= 1.0:
             continue
-        if share <= 0.0:
+        if share <= 0.0 and not is_pane(row, k):
             valid[lane] = 0
             continue
         if ray_words[ID * n + lane] == SOLID:
@@ -165,7 +168,8 @@ def _let_through(arguments):
             context, context_words, number, row[k, SURFACE], ray[TFAR * n + lane]
         ):
             continue
-        filter_colour_at(blend_row, np.int64(blend_slot[prim]), pack, b1, b2, rgba, rgb)
+        cosine = cosine_of(ray, hit, n, lane)
+        passed_colour_at(blend_row, np.int64(blend_slot[prim]), pack, b1, b2, cosine, rgba, rgb)
         largest = np.float32(0.0)
         for c in range(3):
             kept = context[BLEND_TRANSMITTANCE + c * PACKET_WIDTH + number] * np.float32(

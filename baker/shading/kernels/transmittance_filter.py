@@ -2,8 +2,8 @@
 """The filter function of the tree of BLEND triangles, which multiplies transmittance and rejects every hit.
 
 The ID of a ray is its number, 1 to 16, or PASSES plus its number (`trace.packets.PASSES`). If the ID is the
-number, the transmittance is multiplied by lerp(1, c, a), with alpha a and colour c of the surface. If the ID
-is PASSES plus the number, the transmittance is multiplied by (1 - a) lerp(1, c, a). In memory, the
+number, the transmittance is multiplied by the colour of the light that passes the surface (`pane`). If the ID
+is PASSES plus the number, it is also multiplied by 1 - a, with the alpha a of the surface. In memory, the
 transmittance is stored after the query context (`trace.packets.BlendBuffers`).
 
 Based on: Embree 4 API reference, RTCFilterFunctionN and RTCRayQueryContext.
@@ -16,8 +16,9 @@ from numba import carray, cfunc, types  # type: ignore[attr-defined]
 
 from baker.kernels.alpha import SURFACE
 from baker.kernels.textures import MAX_LEVELS, TexturePack
-from baker.kernels.transmittance import ROW_LENGTH, TransmittanceTable, filter_colour_at
+from baker.kernels.transmittance import ROW_LENGTH, TransmittanceTable
 from baker.shading.kernels.edge_hits import crossed_before, on_edge
+from baker.shading.kernels.pane import cosine_of, passed_colour_at
 from baker.trace.embree import HitFilter
 from baker.trace.jit import scratch
 from baker.trace.packets import (
@@ -100,7 +101,7 @@ def _multiply_colour(arguments):
             context, context_words, number, row[k, SURFACE], ray[TFAR * n + lane]
         ):
             continue
-        alpha = filter_colour_at(row, k, pack, b1, b2, rgba, rgb)
+        alpha = passed_colour_at(row, k, pack, b1, b2, cosine_of(ray, hit, n, lane), rgba, rgb)
         share = 1.0 - alpha if full else 1.0
         for c in range(3):
             context[BLEND_TRANSMITTANCE + c * PACKET_WIDTH + number] *= np.float32(share * rgb[c])

@@ -291,12 +291,3 @@ def test_jpeg_and_palette_images_decode_to_opaque_rgba():
 def test_srgb_decoding_at_known_points():
     got = linear_from_srgb(np.array([0, 0.04045, 0.5, 1], np.float32))
     np.testing.assert_allclose(got, [0, 0.0031308, 0.21404114, 1], rtol=2e-5)
-
-
-@pytest.mark.parametrize(("mode", "factor", "told"), [("OPAQUE", 1, 1), ("OPAQUE", 0, 0), ("BLEND", 1, 0)])
-def test_a_pane_that_transmits_light_but_blocks_it_is_told(tmp_path, mode, factor, told):
-    more = {"KHR_materials_transmission": {"transmissionFactor": factor}}
-    builder = quad_builder(name="pane", alphaMode=mode, extensions=more)
-    builder.json["extensionsUsed"] = ["KHR_materials_transmission"]
-    scene = load_scene(write(tmp_path / "a.glb", builder))
-    assert [(w.code, w.object) for w in scene.warnings] == [("transmission", "pane")] * told
