@@ -19,7 +19,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from targets import ANSWERS, SCENES, TARGETS
+from targets import ANSWERS, TARGETS, scenes_of
 
 # Longest permitted duration of the run with one mutation, seconds. A mutation whose run takes longer is
 # reported.
@@ -33,7 +33,7 @@ def run_here(name: str, scene: int, seeds: range) -> int:
         for seed in seeds:
             print(f"seed {seed}", flush=True)
             begin = time.monotonic()
-            found = TARGETS[name](SCENES[scene], Path(folder), np.random.default_rng(seed))
+            found = TARGETS[name](scenes_of(name)[scene], Path(folder), np.random.default_rng(seed))
             if found is None and time.monotonic() - begin > LONGEST:
                 found = f"took {time.monotonic() - begin:.0f} s"
             if found is not None:
@@ -81,7 +81,7 @@ def main() -> int:
     run = run_here if given.here or given.only is not None else run_apart
     failures = 0
     for name in given.targets:
-        for scene in range(len(SCENES)) if given.scene is None else [given.scene]:
+        for scene in range(len(scenes_of(name))) if given.scene is None else [given.scene]:
             failures += run(name, scene, seeds)
     if run is run_here:
         print(f"{' '.join(given.targets)}: " + ", ".join(f"{n} {name}" for name, n in ANSWERS.items()))

@@ -13,7 +13,9 @@ from __future__ import annotations
 
 import json
 import re
+import resource
 import shutil
+import time
 import traceback
 import warnings
 from collections import Counter
@@ -43,6 +45,11 @@ SCENES = (
     ROOT / "assets" / "third-party" / "kaykit-dungeon-torch" / "torch_mounted.gltf.glb",
     ROOT / "assets" / "third-party" / "godot-living-room" / "living_room.glb",
 )
+# Scenes of the target `load`; the other targets use `SCENES`.
+COMPRESSED = tuple(
+    ROOT / "tests" / "compressed" / f"cornell.{kind}.glb"
+    for kind in ("ext", "khr", "edgebreaker", "sequential")
+)
 SMALL = {"resolution": 64, "samples": 1, "bounces": 1, "threads": 1, "denoise": False}
 LONGEST_MESSAGE = 1000
 
@@ -50,6 +57,11 @@ Target = Callable[[Path, Path, Generator], str | None]
 TARGETS: dict[str, Target] = {}
 # Numbers of runs that succeeded, and of runs that raised a `BakerError`.
 ANSWERS = Counter({"accepted": 0, "refused": 0})
+
+
+def scenes_of(name: str) -> tuple[Path, ...]:
+    """Return the scenes of a target."""
+    return COMPRESSED if name == "load" else SCENES
 
 
 def target(function: Target) -> Target:
@@ -95,6 +107,21 @@ def bake(scene: Path, folder: Path, rng: Generator) -> str | None:
             assert np.isfinite(lightmap.value).all(), f"{name} is not finite"
 
     return wrong_answer(run)
+
+
+@target
+def load(scene: Path, folder: Path, rng: Generator) -> str | None:
+    """Load a mutated compressed scene in at most 10 s and 2 GiB, child processes included."""
+    path = mutated_scene(scene, folder, rng)
+    begin = time.monotonic()
+    found = wrong_answer(lambda: baker.load(path))
+    seconds = time.monotonic() - begin
+    memory = max(
+        resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    )
+    if found is None and (seconds > 10.0 or memory > 2 << 20):
+        found = f"took {seconds:.1f} s and {memory / 2**20:.2f} GiB"
+    return found
 
 
 @target
