@@ -16,6 +16,7 @@ NOTES = {
     "bad-texcoord": ("warning", "repair the texture coordinates; they are read as 0"),
     "extension-ignored": ("info", "export without the extension if it changes shapes or colours"),
     "integer-colours": ("warning", "export the vertex colours as normalized integers or floats"),
+    "lower-levels": ("info", "bake lower levels apart if they need a lightmap of their own"),
     "missing-file": ("info", "put the file beside the scene if the level needs it"),
     "missing-mtl": ("warning", "put the material library beside the scene"),
     "missing-texcoord": ("warning", "export the texture coordinates that the material reads"),
@@ -44,7 +45,7 @@ def file_note(context: CheckContext) -> Iterator[RawFinding]:
     - skinned meshes and morph targets, which are baked in one pose, and animations that change other values;
     - unlit materials, which reflect no light, and materials whose transmission is not used completely;
     - primitives of points and lines;
-    - several scenes in one file;
+    - several scenes in one file, and lower levels of detail;
     - missing texture coordinates or material libraries;
     - unreadable parts that a bake does not need: normal maps, unused files, tangents, cameras.
     """

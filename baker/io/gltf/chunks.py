@@ -11,6 +11,7 @@ from typing import NamedTuple, NoReturn
 from baker.core.errors import InputError
 
 MAGIC = b"glTF"
+CONVERTER = "convert the file with `npx gltf-pipeline -i OLD -o NEW.glb`"
 CHUNK_JSON, CHUNK_BIN = 0x4E4F534A, 0x004E4942
 
 
@@ -59,7 +60,8 @@ def split_glb(data: bytes, file: str) -> Chunks:
         fail(f"the GLB is cut off after {len(data)} bytes, inside its header; export it again")
     version, length = struct.unpack_from("<II", data, 4)
     if version != 2:
-        fail(f"this is binary glTF version {version}; only glTF 2.0 is read, so convert it first")
+        how = f"; {CONVERTER}" if version == 1 else ", so export it as glTF 2.0"
+        fail(f"this is binary glTF version {version}; only glTF 2.0 is read{how}")
     if length > len(data):
         fail(f"the GLB is cut off: its header says {length} bytes, the file has {len(data)}")
     text: bytes | None = None

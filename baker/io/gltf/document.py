@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from baker.core.errors import InputError
-from baker.io.gltf.chunks import MAGIC, Chunks, split_glb
+from baker.io.gltf.chunks import CONVERTER, MAGIC, Chunks, split_glb
 from baker.io.gltf.json import JsonObject
 from baker.io.gltf.uri import UriError, is_data, read_uri
 from baker.io.scene_folder import OutsideError, OutsideName, SceneFolder
@@ -185,7 +185,8 @@ def _check_version(root: JsonObject) -> None:
         version = asset.string(key, "2.0") if key == "minVersion" else asset.string(key)
         major, _, minor = version.partition(".")
         if major != "2" or (key == "minVersion" and minor not in ("", "0")):
-            asset.fail(f"this is glTF {version}; only glTF 2.0 is read, so convert it first", key)
+            how = f"; {CONVERTER}" if major == "1" else ", so export it as glTF 2.0"
+            asset.fail(f"this is glTF {version}; only glTF 2.0 is read{how}", key)
 
 
 def _read_buffer(

@@ -23,7 +23,6 @@ _LAYERS = (
     "KHR_materials_diffuse_transmission",
     "KHR_materials_subsurface",
     "KHR_materials_volume_scatter",
-    "MSFT_lod",
     "MSFT_packing_normalRoughnessMetallic",
     "MSFT_packing_occlusionRoughnessMetallic",
     "VRMC_materials_hdr_emissiveMultiplier",

@@ -23,6 +23,7 @@ from baker.io.gltf.expand import expand_document
 from baker.io.gltf.instancing import refuse_broken
 from baker.io.gltf.json import JsonObject
 from baker.io.gltf.light import read_light
+from baker.io.gltf.lod import without_lower_levels
 from baker.io.gltf.material import MaterialReader
 from baker.io.gltf.mesh import read_primitives
 from baker.io.gltf.morph import has_targets, morphed, weights_of
@@ -85,6 +86,7 @@ def import_gltf(source: SceneFile) -> Scene:
     number, placed = choose_scene(
         document, nodes, source.options.scene_name, warnings, lenient=source.lenient
     )
+    placed = without_lower_levels(placed, len(nodes), warnings)
     reader = MaterialReader(document, source.options, reflections=source.reflections)
     meshes, instances, source_scene = _instances(
         document, placed, Poser(document, nodes), reader, warnings, lenient=source.lenient
