@@ -24,6 +24,7 @@ from baker.core.parallel import thread_count
 from baker.core.scene import Mesh, Scene
 from baker.core.settings import BakeSettings
 from baker.core.source_mesh import SourceInstance, SourceMesh, SourcePrimitive, SourceScene
+from baker.io.mesh.build import sound_meshes
 
 # Largest number of points of each object in `CheckContext.test_points`.
 _TEST_POINTS = 8
@@ -76,8 +77,13 @@ class CheckContext:
         self.probe = probe
         self.source = scene.source_scene if scene.source_scene is not None else source_scene_of(scene)
         self._uv: dict[int, UvFacts] = {}
-        trusted = scene.source_scene is None
-        self.meshes = tuple(MeshFacts(mesh, scene.materials, trusted=trusted) for mesh in self.source.meshes)
+        sound = [True] * len(self.source.meshes)
+        if scene.source_scene is not None:
+            sound = sound_meshes([mesh.primitives for mesh in self.source.meshes])
+        self.meshes = tuple(
+            MeshFacts(mesh, scene.materials, sound=valid)
+            for mesh, valid in zip(self.source.meshes, sound, strict=True)
+        )
 
     @cached_property
     def first_instance(self) -> dict[int, SourceInstance]:

@@ -41,13 +41,14 @@ class MeshFacts:
         Index into `source.primitives` of each face's primitive, and the number of the face in this primitive.
     material : (T,) int32
         Material index of each face.
-    trusted : bool
-        True if the importer has already removed unusable faces; then all faces are good.
+    sound : bool
+        True if all faces are known to be good, because the importer has removed the others, or because
+        `sound_meshes` found no others.
     """
 
-    def __init__(self, source: SourceMesh, materials: tuple[Material, ...], *, trusted: bool = False) -> None:
+    def __init__(self, source: SourceMesh, materials: tuple[Material, ...], *, sound: bool = False) -> None:
         self.source = source
-        self.trusted = trusted
+        self.sound = sound
         self.materials = materials
         start = np.cumsum([0] + [len(p.position) for p in source.primitives])
         self.vertex_start = start
@@ -73,7 +74,7 @@ class MeshFacts:
     @cached_property
     def within(self) -> NDArray[np.bool_]:
         """Return (T,) bool: the faces whose three indices refer to vertices of their own primitive."""
-        if self.trusted:
+        if self.sound:
             return np.ones(len(self.triangle), bool)
         low, high = self.vertex_start[self.primitive], self.vertex_start[self.primitive + 1]
         return in_range(self.triangle, low, high)
@@ -81,7 +82,7 @@ class MeshFacts:
     @cached_property
     def usable(self) -> NDArray[np.bool_]:
         """Return (T,) bool: the faces with valid indices and usable coordinates (see `usable_vertices`)."""
-        if self.trusted:
+        if self.sound:
             return self.within
         good = usable_vertices(self.position)
         if good.all() and self.within.all():
@@ -94,7 +95,7 @@ class MeshFacts:
     def flat(self) -> NDArray[np.bool_]:
         """Return (T,) bool: the usable faces without area."""
         found = np.zeros(len(self.triangle), bool)
-        if self.trusted:
+        if self.sound:
             return found
         usable = np.flatnonzero(self.usable)
         found[usable] = zero_area(self.position, self.triangle[usable])
@@ -104,7 +105,7 @@ class MeshFacts:
     def repeated(self) -> NDArray[np.bool_]:
         """Return (T,) bool: the usable faces with area that repeat an earlier face."""
         found = np.zeros(len(self.triangle), bool)
-        if self.trusted:
+        if self.sound:
             return found
         rest = np.flatnonzero(self.usable & ~self.flat)
         double_sided = self.flag(self.material[rest], lambda m: m.double_sided)

@@ -261,6 +261,9 @@ def _primitives(mesh: Any, corners: _Corners, default: int) -> list[SourcePrimit
     n = len(vertex) // 3
     material = np.array(mesh.material_ids, np.int64)[:n]
     material = np.where((material < 0) | (material >= default), default, material)
+    if n and (material == material[0]).all():
+        own = vertex[: 3 * n], normal[: 3 * n], texcoord[: 3 * n]
+        return [_primitive(0, int(material[0]), *own, corners)]
     primitives = []
     for number, used in enumerate(np.unique(material)):
         mine = np.repeat(material == used, 3)
@@ -287,10 +290,12 @@ def _primitive(
 ) -> SourcePrimitive:
     """Return a primitive from the (3 T,) position, normal and texcoord indices of its corners."""
     # Create one vertex for each distinct index triple. Two steps keep the keys within 64 bits.
-    _, first = np.unique(vertex * (len(corners.texcoord) + 1) + texcoord + 1, return_inverse=True)
-    _, row, index = np.unique(
-        first * (len(corners.normal) + 1) + normal + 1, return_index=True, return_inverse=True
-    )
+    first = vertex
+    if (texcoord >= 0).any():
+        _, first = np.unique(vertex * (len(corners.texcoord) + 1) + texcoord + 1, return_inverse=True)
+    if (normal >= 0).any():
+        first = first * (len(corners.normal) + 1) + normal + 1
+    _, row, index = np.unique(first, return_index=True, return_inverse=True)
     v, n, t = vertex[row], normal[row], texcoord[row]
     given = None
     if (n >= 0).any():

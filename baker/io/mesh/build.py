@@ -12,11 +12,21 @@ from numpy.typing import NDArray
 
 from baker.core.scene import LARGEST_UV, Material, Mesh, SceneWarning
 from baker.core.source_mesh import SourcePrimitive
-from baker.topology.triangle_check import duplicates, face_normal, in_range, usable_vertices, zero_area
+from baker.topology.triangle_check import (
+    duplicates,
+    face_normal,
+    in_range,
+    sound_groups,
+    usable_vertices,
+    zero_area,
+)
+
+# Number of vertices that `sound_meshes` tests together, except in meshes with more.
+_BATCH = 1 << 17
 
 
 def build_mesh(
-    name: str, primitives: Sequence[SourcePrimitive], materials: Sequence[Material]
+    name: str, primitives: Sequence[SourcePrimitive], materials: Sequence[Material], *, sound: bool = False
 ) -> tuple[Mesh | None, list[SceneWarning]]:
     """Concatenate the valid triangles of primitives into one mesh.
 
@@ -28,6 +38,8 @@ def build_mesh(
         The primitives of the file.
     materials : sequence of Material
         Materials of the scene; `double_sided` and the TEXCOORD sets of their textures are used.
+    sound : bool
+        Whether all triangles are known to be valid, see `sound_meshes`.
 
     Returns
     -------
@@ -42,7 +54,9 @@ def build_mesh(
     if not primitives:
         return None, []
     warnings: list[SceneWarning] = []
-    kept = _valid_triangles(name, primitives, materials, warnings)
+    kept = (
+        [p.triangle for p in primitives] if sound else _valid_triangles(name, primitives, materials, warnings)
+    )
     parts = [_Part(p, t) for p, t in zip(primitives, kept, strict=True) if len(t)]
     if not parts:
         return None, warnings
@@ -70,6 +84,37 @@ def build_mesh(
         colour=colour,
     )
     return mesh, warnings
+
+
+def sound_meshes(meshes: Sequence[Sequence[SourcePrimitive]]) -> list[bool]:
+    """Return for each mesh whether all its triangles are certainly valid, so that no further test is needed.
+
+    Parameters
+    ----------
+    meshes : sequence of sequence of SourcePrimitive
+        The primitives of each mesh.
+
+    Returns
+    -------
+    list of bool
+        One for each mesh. It may be False although all triangles are valid.
+    """
+    sound = np.zeros(len(meshes), bool)
+    size = np.cumsum([sum(len(p.position) for p in mesh) for mesh in meshes])
+    for mine in np.split(np.arange(len(meshes)), np.flatnonzero(np.diff(size // _BATCH)) + 1):
+        parts = [(number, p) for number in mine for p in meshes[number] if len(p.triangle)]
+        if not parts or any(p.stitched for _, p in parts):
+            continue
+        start = np.cumsum([0] + [len(p.position) for _, p in parts])
+        length = [len(p.triangle) for _, p in parts]
+        low, high = np.repeat(start[:-1], length), np.repeat(start[1:], length)
+        triangle = np.concatenate([p.triangle for _, p in parts]) + low[:, None]
+        if not in_range(triangle, low, high).all():
+            continue
+        owner = np.repeat([number - mine[0] for number, _ in parts], length)
+        position = np.concatenate([p.position for _, p in parts])
+        sound[mine] = sound_groups(position, triangle, owner, len(mine))
+    return sound.tolist()
 
 
 def _valid_triangles(

@@ -11,7 +11,7 @@ from baker.core.errors import InputError
 from baker.core.scene import Instance, Material, Mesh, Scene, SceneWarning
 from baker.core.source_mesh import SourceInstance, SourceMesh, SourcePrimitive, SourceScene
 from baker.io.load import SceneFile
-from baker.io.mesh.build import build_mesh
+from baker.io.mesh.build import build_mesh, sound_meshes
 
 
 def to_world(vector: NDArray[np.float64], up: str, scale: float) -> NDArray[np.float32]:
@@ -72,8 +72,9 @@ def scene_of_meshes(
     found = list(warnings)
     meshes: list[Mesh] = []
     instances: list[Instance] = []
-    for name, primitives in groups:
-        mesh, defects = build_mesh(name, primitives, materials)
+    sound = sound_meshes([primitives for _, primitives in groups])
+    for (name, primitives), valid in zip(groups, sound, strict=True):
+        mesh, defects = build_mesh(name, primitives, materials, sound=valid)
         found += defects
         if mesh is not None:
             instances.append(Instance(len(meshes), name, len(meshes), np.eye(4)))
