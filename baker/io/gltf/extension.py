@@ -25,13 +25,13 @@ class GltfExtension:
     kept : str
         What `scene.glb` contains of it, for the docs.
     refused : str
-        The end of the sentence that refuses a file which requires the extension: "the file requires the
-        extension NAME, ...". Empty if such files are read.
+        The end of the error message "the file requires the extension NAME, ...". Empty if files that require
+        the extension are read.
     ignored : bool
         Whether a file that uses the extension gets the warning `extension-ignored`.
     replaces_colour : bool
-        Whether a material with the extension may have its base colour in the extension, so that a material
-        without a base colour elsewhere gets a default albedo and a warning.
+        Whether the extension may contain the base colour of a material but is not read. A material with the
+        extension and without any other base colour gets a default albedo and a warning.
     decode : callable or None
         Returns the document with the data of the extension as plain buffers, before anything else is read.
     expand : callable or None
