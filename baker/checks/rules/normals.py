@@ -113,8 +113,9 @@ def normal_length(context: CheckContext) -> Iterator[RawFinding]:
 def normals_against_faces(context: CheckContext) -> Iterator[RawFinding]:
     """Faces whose vertex normals all point to the back of the face.
 
-    The winding defines the front, which is the side that receives light. The vertex normals define the
-    hemisphere from which light is gathered. If this hemisphere is at the back, the face is black.
+    The winding defines the front, which is the side that receives light. A bake ignores vertex normals that
+    point to the back: it uses the normal of the face, so the surface looks faceted. Engines use the vertex
+    normals for dynamic lights, which then light the wrong side.
     """
     for m, facts in enumerate(context.meshes):
         for k, p in _parts(facts):

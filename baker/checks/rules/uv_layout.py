@@ -84,7 +84,8 @@ def overlap(context: CheckContext) -> Iterator[RawFinding]:
     """Faces of one object that overlap in the lightmap uv and therefore share texels.
 
     Both faces show the light of one of the faces. Overlaps are searched on a grid of twice the resolution of
-    the page, at most 8192 x 8192 points. The percentage is the share of overlapping points. Up to 0.1 % is
+    the page, at most 8192 x 8192 points. The percentage is the number of repeated coverings of points by
+    faces, divided by the number of all coverings: 50 % if every point is covered twice. Up to 0.1 % is
     accepted as rounding. Ten pairs of faces are listed.
     """
     from baker.checks.kernels.uv_pairs import COVERED, COVERED_AGAIN, LISTED, OVERLAPPING, cover_pairs
