@@ -91,9 +91,10 @@ def fill_pages(
     """Pack all instances into pages of exactly `settings.resolution` texels.
 
     If `settings.density` is None, all instances are packed into one page, at the largest density that fits.
-    If no density fits, they are packed into up to `max_pages` pages. If `settings.density` is a number,
-    instances are packed at this density into up to `max_pages` pages. If the pages are not enough, the
-    density is lowered. If nothing fits with the padding of the settings, the padding is reduced.
+    If `settings.density` is a number, instances are packed at this density into up to `max_pages` pages. If
+    the pages are not enough, the density is lowered. If nothing fits with the padding of the settings, the
+    padding is reduced. If still nothing fits and `settings.density` is None, the instances are packed into up
+    to `max_pages` pages.
 
     Parameters
     ----------
