@@ -126,7 +126,7 @@ def _table(model: type[Settings], config: Path) -> dict[str, Any]:
     """Return the validated values of a model's table, by field. Errors name the file."""
     table = read_config(config, model.table)
     if "scene_name" in model.model_fields and "scene" in table:
-        # Keys have the names of flags.
+        # The key has the name of the flag, not of the setting.
         table = {"scene_name" if key == "scene" else key: value for key, value in table.items()}
     try:
         checked = model.make(table)

@@ -51,8 +51,8 @@ class CheckSettings(Settings):
 def with_extras(settings: CheckSettings, scene: Scene) -> CheckSettings:
     """Add the settings in `extras.baker.check` of the document to settings of a check.
 
-    These may be `fail_on`, which is used if `settings` has none, and `ignore`. `ignored_by_nodes` reads the
-    extras of nodes.
+    The extras may contain `ignore` and `fail_on`. `fail_on` is used only if `settings` has none.
+    `ignored_by_nodes` reads the extras of nodes.
 
     Parameters
     ----------

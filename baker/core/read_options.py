@@ -51,5 +51,5 @@ class ReadOptions:
         return cls(**{name: getattr(settings, name) for name in names if hasattr(settings, name)})
 
 
-# The options that change nothing.
+# Default options, with which the file is read as it is.
 AS_IN_FILE = ReadOptions()

@@ -46,7 +46,8 @@ from baker.trace.packets import PacketBuffers
 # Items per tile: texels that are tested (_TILE), texels whose points are grouped (_SUSPECTS), pairs of
 # neighbouring entries (_PAIRS).
 _TILE = 4096
-# Number of rays that `crossed_texels` casts from a texel that nothing crosses, which are most texels.
+# Number of rays that `crossed_texels` casts from a texel that no other surface crosses. Most texels are of
+# this kind.
 _MOST_RAYS = 8
 _SUSPECTS, _PAIRS = 1024, 2048
 # The first visibility test of two neighbouring entries uses only point 0 of each entry. The second test uses

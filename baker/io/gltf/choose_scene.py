@@ -62,7 +62,7 @@ def choose_scene(
 
 
 def named_index(items: list[JsonObject], asked: str, what: str, file: str) -> int:
-    """Return the index of the item with a name, or else of the item with a number.
+    """Return the index of the item whose name is `asked`; without such an item, the number `asked`.
 
     Parameters
     ----------

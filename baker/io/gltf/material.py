@@ -75,8 +75,8 @@ class MaterialReader:
         Raises
         ------
         InputError
-            If a value has a wrong type or is out of range. If the texture of the base colour cannot be read,
-            or that of the emission of a material that emits.
+            If a value has a wrong type or is out of range. If a texture that a bake needs cannot be read, and
+            `missing_textures` is "error".
         """
         if number == len(self._unread):
             if len(self.materials) == number:
