@@ -1,4 +1,4 @@
-"""Decodes Draco meshes in a child process that a broken mesh may end without effect on this process."""
+"""Decodes Draco meshes in a child process, so that a broken mesh cannot crash this process."""
 
 from __future__ import annotations
 
@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 from baker.core.child_process import start_module
 from baker.core.messages import read_message, write_message
 
-# Memory, bytes: a fixed part, and a part for each byte of the decoded mesh, which the decoder copies several
-# times. Meshes are expected to be at most `_RATIO` times as large as their compressed data.
+# Limit of the decoder's memory, bytes: `_MEMORY`, and `_COPIES` for each byte of the decoded mesh, because
+# the decoder copies the mesh several times. The size of the mesh counts up to `_RATIO` times the size of the
+# compressed data.
 _MEMORY, _COPIES, _RATIO = 1 << 30, 8, 1000
-# Processor time, seconds: a fixed part, and a part for each byte of compressed data (0.5 MB/s).
+# Limit of processor time, seconds: a fixed part, and a part for each byte of compressed data (0.5 MB/s).
 _SECONDS, _SECONDS_PER_BYTE = 8, 2e-6
-# Wall-clock time divided by processor time, because other programs may use the processor as well.
+# Limit of wall-clock time, divided by the limit of processor time. Other programs may use the processor as
+# well.
 _WALL = 10.0
 
 
@@ -65,7 +67,7 @@ class DracoDecoder:
         data : bytes
             The compressed mesh.
         size : int
-            Expected size of the decoded mesh, bytes. A file may state any number.
+            Size of the decoded mesh that the file states, bytes. It may be wrong.
 
         Returns
         -------

@@ -51,9 +51,9 @@ def _decode(data: bytes) -> dict[str, NDArray[Any]]:
 
 
 def _limit(memory: int, seconds: int) -> None:
-    """Limit further memory, bytes, and further processor time on Linux.
+    """Limit further memory, bytes, and further processor time, seconds; only on Linux.
 
-    Other systems do not enforce these limits, or have none; there, only the parent's time limit holds.
+    On other systems, only the time limit of the parent process applies.
     """
     if sys.platform == "linux":
         import resource

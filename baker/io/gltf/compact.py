@@ -26,7 +26,8 @@ def drop_words(data: bytes, dead: Iterable[Span], live: Iterable[Span]) -> tuple
     data : bytes
         The remaining words; the last one is filled with zeros.
     before : (W + 1,) int64
-        Number of removed words before each of the W words of the buffer, and the number of all.
+        Number of removed words before each of the W words of the buffer; the last item is the number of all
+        removed words.
     """
     words = np.frombuffer(data + b"\0" * (-len(data) % 4), np.uint32)
     drop = np.zeros(len(words), bool)

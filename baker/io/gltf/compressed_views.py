@@ -85,7 +85,7 @@ def _decode(
     view: JsonObject, extension: JsonObject, source: NDArray[np.uint8], decoded: DecodedData
 ) -> NDArray[np.uint8]:
     """Return the elements of a view as (N,) uint8."""
-    # Numba takes longer to import than most files take to load.
+    # Import here, because Numba takes longer to import than most files take to load.
     from baker.io.meshopt.stream import Layout, StreamError, decode_stream
 
     layout = Layout(

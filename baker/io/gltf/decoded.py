@@ -51,7 +51,7 @@ class DecodedData:
         self.length += len(data) + -len(data) % 4
 
     def drop(self, buffer: int, offset: int, length: int) -> None:
-        """Remove bytes, and the padding after them, that nothing else in the document refers to."""
+        """Mark bytes and their padding as unused; `finish` removes those that nothing else refers to."""
         end = offset + length
         self._dead.setdefault(buffer, []).append((offset, end + -end % 4))
 
@@ -70,7 +70,7 @@ class DecodedData:
         if self._parts:
             buffers.append(b"".join(part.data for part in self._parts))
             self._root["buffers"].append({"byteLength": self.length})
-        # Forget the placeholders of uncompressed data that is not in the file.
+        # Forget the errors of placeholder buffers, which stand for uncompressed data that is not in the file.
         for number in self._left - {holder.get("buffer") for holder in _holders(self._root)}:
             if faults.pop(number, None) is not None:
                 buffers[number] = b""

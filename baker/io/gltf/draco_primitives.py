@@ -1,6 +1,6 @@
 """Decodes primitives that are compressed with KHR_draco_mesh_compression.
 
-A primitive whose attributes are all in the file uncompressed as well is not decoded.
+A primitive is not decoded if the file also contains all its attributes and indices in uncompressed form.
 
 Based on: Khronos Group, KHR_draco_mesh_compression.
 """
@@ -24,7 +24,7 @@ from baker.io.gltf.packer import ARRAY_BUFFER, COMPONENT, ELEMENT_ARRAY_BUFFER, 
 DRACO = "KHR_draco_mesh_compression"
 _WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _TRIANGLES, _STRIP = 4, 5
-# Stands for the faces of a stream where other arrays have the id of an attribute.
+# Id of the faces of a stream, where other arrays have the id of an attribute.
 _FACES = -1
 _INDEX_TYPE = {1: 5121, 2: 5123, 4: 5125}
 
@@ -47,7 +47,8 @@ def decode_primitives(document: GltfDocument) -> GltfDocument:
     if not found and not is_listed(document.root.value, (DRACO,)):
         return document
     decoded = DecodedData(document)
-    # Decoded data looks like a plain copy of other primitives with the same accessors, so find copies first.
+    # Find uncompressed copies first. After a primitive is decoded, its data would look like an uncompressed
+    # copy for other primitives with the same accessors.
     uncompressed = {primitive.where for primitive in found if _has_plain_copy(document, primitive)}
     with DracoDecoder() as decoder:
         reader = _Reader(document, decoded, decoder)
@@ -122,7 +123,7 @@ class _Reader:
         for name, number, array in arrays:
             self._fill(attributes.value, name, (stream, number), array)
         self._fill(primitive.value, "indices", (stream, _FACES), _narrowed(mesh.faces, kind))
-        # The faces of a strip are separate triangles.
+        # Decoded faces are separate triangles, also if the primitive was a strip.
         primitive.value.pop("mode", None)
 
     def _accessor(self, holder: JsonObject, key: str) -> JsonObject:
@@ -143,7 +144,7 @@ class _Reader:
         return self._meshes[stream]
 
     def _size(self, primitive: JsonObject) -> int:
-        """Return the size of the decoded primitive that its accessors state, bytes; at most 16 an element."""
+        """Return an upper bound of the size of the decoded primitive, bytes: 16 for each element."""
         attributes = primitive.child("attributes")
         used = [(attributes, key) for key in attributes.value]
         used += [(primitive, "indices")] if "indices" in primitive else []

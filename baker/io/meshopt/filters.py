@@ -36,7 +36,7 @@ def _quaternion(data: NDArray[np.uint8], stride: int) -> None:
     """Compute the largest component of unit quaternions from the others, and put all in their places."""
     element = data.view(np.int16).reshape(-1, 4)
     last = element[:, 3].astype(np.int32)
-    # `one` is the stored value of 1, so x^2 + y^2 + z^2 + w^2 is two of its squares.
+    # `one` is the stored value of 1 / sqrt(2). Therefore x^2 + y^2 + z^2 + w^2 = 2 one^2.
     one = (last | 3).astype(np.float32)
     x, y, z = (element[:, k].astype(np.float32) for k in range(3))
     w = np.sqrt(np.maximum(one * (one + one) - (x * x + (y * y + z * z)), np.float32(0.0)))
@@ -59,7 +59,7 @@ def _colour(data: NDArray[np.uint8], stride: int) -> None:
     signed = element.view(np.int8 if stride == 4 else np.int16)
     y, alpha = element[:, 0].astype(np.int32), element[:, 3].astype(np.int32)
     orange, green = signed[:, 1].astype(np.int32), signed[:, 2].astype(np.int32)
-    # All bits up to the highest one of alpha, which marks the number of bits.
+    # Set all bits below the highest set bit of alpha, which marks the number of bits of the components.
     full = alpha.copy()
     for shift in (1, 2, 4, 8):
         full |= full >> shift

@@ -15,7 +15,7 @@ from baker.io.meshopt.filters import FILTERS, apply_filter
 from baker.io.meshopt.index_codec import decode_indices, decode_triangles
 from baker.io.meshopt.status import DONE, REASONS, TOO_SHORT
 
-# Low bytes of the streams: 0xa0 and 0xa1 attributes, 0xe1 triangles, 0xd1 indices.
+# First bytes of streams: 0xa0 and 0xa1 attributes, 0xe1 triangles, 0xd1 indices.
 _HEADERS = {"ATTRIBUTES": (0xA0, 0xA1), "TRIANGLES": (0xE1,), "INDICES": (0xD1,)}
 
 
@@ -115,6 +115,7 @@ def _shortest(layout: Layout, version: int) -> int:
     step = min(BLOCK_ELEMENTS, BLOCK_BYTES // stride // GROUP * GROUP)
     blocks = -(-count // step)
     tail = max(24, stride + stride // 4) if version else max(32, stride)
-    # Version 1 has at least two bits for each byte of an element; version 0 has a byte for each four groups.
+    # In version 1, a block has at least two bits for each byte of an element. In version 0, each byte of an
+    # element has at least one byte for every four groups.
     body = blocks * (stride // 4) if version else stride * (-(-count // (4 * GROUP)))
     return 1 + body + tail
