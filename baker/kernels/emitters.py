@@ -206,12 +206,12 @@ def cluster_chances(emitters, origin, chance, cumulative):  # type: ignore[no-un
 
         weight = power / max(distance^2, (sum of both radii)^2) * max(cos(angle), 0.05)
 
-    `distance` is between the centres of the cluster and of the bounding sphere. `angle` is a lower bound of
-    the angle between a normal of the cluster and a direction from the cluster to the bounding sphere. If it
-    is 90 degrees or more, the weight is 0, because all points are behind the emitting sides. If the two
-    spheres touch or `Emitters.spread` is at least 3 radians, the factor max(...) of the cosine is 1. The
-    probability of a cluster of positive weight is 0.95 weight / (sum of weights) + 0.05 / (number of clusters
-    of positive weight).
+    `distance` is between the centres of the cluster and of the bounding sphere. `angle` is a lower bound, at
+    least 0, of the angle between a normal of the cluster and a direction from the cluster to the bounding
+    sphere. If it is 90 degrees or more, the weight is 0, because all points are behind the emitting sides. If
+    the two spheres touch or `Emitters.spread` is at least 3 radians, the factor max(...) of the cosine is 1.
+    The probability of a cluster of positive weight is 0.95 weight / (sum of weights) + 0.05 / (number of
+    clusters of positive weight).
 
     emitters : Emitters; origin : (m, w, 3) float32, metres, points
     chance, cumulative : (C,) float32 output, see `TileEmitters`

@@ -28,9 +28,9 @@ N_POINTS = 16
 #
 #     max(ROUNDING max(x, s), OFFSET min(x, s))
 #
-# x is the largest coordinate of the point, and s the largest edge component of the triangle. ROUNDING is
-# sixteen times the relative spacing of float32 numbers. Rounding moves an origin and a hit by one spacing
-# each, and faces that are meant to be coplanar may be a few spacings apart.
+# x is the largest absolute coordinate of the point, and s the largest absolute component of the triangle's
+# edges 1 and 2. ROUNDING is sixteen times the relative spacing of float32 numbers. Rounding moves an origin
+# and a hit by one spacing each, and faces that are meant to be coplanar may be a few spacings apart.
 OFFSET, ROUNDING = 1.0e-5, 1.9e-6
 # Distance by which points near the border of their triangle are moved towards its centroid, as a multiple of
 # the offset. The distance is at most half of the distance to the centroid.

@@ -122,7 +122,7 @@ def trace_shadow_packet(blend, function, scene, width, on, packet):
 
 @inner
 def reset_transmittance(blend):
-    """Set the transmittance of sixteen rays to 1, and delete the edge hits stored for them."""
+    """Set the transmittance of sixteen rays to 1, and forget their hits on edges (`BlendBuffers.edges`)."""
     colour, edges = blend.transmittance, blend.edges
     for j in range(3 * PACKET_WIDTH):
         colour[j] = _f(1.0)

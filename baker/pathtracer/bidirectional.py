@@ -202,8 +202,7 @@ def show(path, row, lane, camera, n_subpaths, value, ray):
     """Connect the end of a light subpath to the camera; return its pixel, or -1 outside the picture.
 
     path : (N_ROWS_BOTH, n) float64; row : (5, n) float64; camera, n_subpaths : see `trace_both_ways`
-    value : (3,) float64, output, MIS-weighted splat if nothing blocks the connection. A pixel's radiance is
-        the sum of its splats, from the light subpaths of all pixels
+    value : (3,) float64, output, MIS-weighted splat if nothing blocks the connection, divided by `n_subpaths`
     ray : (6,) float64, output, from the vertex to the camera, see `connect`
     """
     for a in range(3):

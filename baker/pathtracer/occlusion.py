@@ -3,8 +3,8 @@
 A packet holds one ray from each of eight neighbouring points, all with the same sample number. The leading
 bits of the random numbers of a sample are the same for all points (`kernels.sampling.shared_bits_mask`), so
 the eight rays are nearly parallel. If the points are also close together, the packet is traced with Embree's
-coherent flag, which makes tracing faster. Loops over lanes that only compute access a single array, because
-the compiler vectorizes loops of eight iterations only then (see `path_blocks`).
+coherent flag, which makes tracing faster. In each loop over lanes that only does arithmetic, all operands are
+in one array. Otherwise the compiler would not vectorize a loop of eight iterations (see `path_blocks`).
 
 Based on: Morton, A computer oriented geodetic data base and a new technique in file sequencing, 1966.
 """

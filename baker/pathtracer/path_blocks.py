@@ -106,7 +106,7 @@ class PathMemory(NamedTuple):
 
 
 def new_path_memory(rays: RayScene) -> PathMemory:
-    """Return memory at multiples of 64 bytes. Rays in it have time 0, tnear 0 and all mask bits set."""
+    """Return memory aligned to 64 bytes, in which all rays have time 0, tnear 0 and all mask bits set."""
     on, s = aligned_floats(BLOCK_WIDTH).view(np.int32), aligned_floats(BLOCKS * BLOCK)
     bins = aligned_floats(BINS * BIN_ROWS * _L)
     s.view(np.uint32).reshape(BLOCKS, N_ROWS, BLOCK_WIDTH)[:, MASK] = NO_HIT

@@ -78,7 +78,7 @@ _PI, _INV_PI = _f(math.pi), _f(1.0 / math.pi)
 _OFFSET, _ROUNDING, _SHORT, _FAR = _f(OFFSET), _f(ROUNDING), _f(SHORT), _f(FAR)
 _SURE, _MOST = _f(SURE), _f(MOST)
 _EMITTER, _CONE, _PARALLEL, _SKY = _f(KIND_EMITTER), _f(KIND_CONE), _f(KIND_PARALLEL), _f(KIND_SKY)
-# Offsets, in numbers, of the triangle's copy and of the light's copy in a block.
+# Indices, in a block, of the first number of the triangle's copy and of the light's copy.
 _T = TRIANGLE * BLOCK_WIDTH
 _M = LIGHT_ROW * BLOCK_WIDTH
 _L = BLOCK_WIDTH

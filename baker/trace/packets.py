@@ -196,7 +196,7 @@ class PacketBuffers(NamedTuple):
 
 
 def new_packet_buffers(tracer: Tracer, *, solid: bool = False) -> PacketBuffers:
-    """Return memory for a packet, at multiples of 64 bytes as Embree requires.
+    """Return memory for packets, aligned to 64 bytes as Embree requires.
 
     All rays have time 0, tnear 0 and all mask bits set. Kernels do not change these rows.
 

@@ -246,10 +246,9 @@ def move_to_centre(value, chart, covered, offset, smallest, highest, out, first_
 def match_lookups(value, chart, covered, offset, smallest, highest, moved, out, first_row, end_row):
     """Set each partly covered texel so that a bilinear lookup at its centroid returns its mean.
 
-    A texel is changed only if all texels of this lookup are covered and in its chart. The difference from the
-    result of `move_to_centre` is reduced by NOISY times the texel's mean, because the result of
-    `move_to_centre`, which is computed from a plane through many texels, has less noise than the value that
-    matches the lookup.
+    A texel is changed only if all texels of this lookup are covered and in its chart. The value that matches
+    the lookup has more noise than the result of `move_to_centre`, which is computed from a plane through many
+    texels. Therefore the difference of both is reduced by NOISY times the texel's mean.
 
     Parameters
     ----------

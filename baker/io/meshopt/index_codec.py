@@ -15,7 +15,9 @@ from baker.io.meshopt.status import BAD_CODE, DONE, TOO_LONG, TOO_SHORT
 from baker.trace.jit import inner, kernel, scratch
 
 _MASK = 0xFFFFFFFF
-# Values of the four low bits of a code, from which on the third vertex is relative to the last one.
+# Values of the four low bits of a code. From _BEFORE_LAST on, the third vertex is free: it is stored relative
+# to the last free vertex. For _FREE, the data contains the difference; for the two smaller values, the
+# difference is -1 and 1.
 _BEFORE_LAST, _FREE = 13, 15
 # The 16 latest edges and vertices.
 _edge_queue = scratch((16, 2), np.int64)

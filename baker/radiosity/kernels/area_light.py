@@ -6,7 +6,7 @@
 The sum is over the unblocked rays of n shadow rays, with the radiance L of the emitter and the cosine at the
 texel. p are probability densities per steradian. The balance heuristic combines these light samples with
 n_hemisphere cosine-weighted rays, some of which hit the same emitters (`emitter_hit`). If no test ray of
-sixteen neighbouring texels is blocked and the emitters are few, untextured and opaque, the closed form of
+sixteen consecutive texels is blocked and the emitters are few, untextured and opaque, the closed form of
 `radiosity.kernels.polygon_light` replaces both estimates.
 
 Based on: Veach and Guibas, Optimally combining sampling techniques, 1995.
@@ -45,7 +45,7 @@ _f = np.float32
 _INV_PI = np.float32(1.0 / math.pi)
 # TFAR of shadow rays, as a share of the distance to the emitter: the rays end before they hit the emitter.
 _SHORT = np.float32(0.9999)
-# Smallest number of samples per texel and emitter with which the closed form is used.
+# Smallest ratio of samples per texel to emitters for which the closed form is used.
 _SAMPLES_PER_EMITTER = 8
 # Smallest mean number of test rays per texel for the early out of `light_samples`. With fewer test rays,
 # texels are not treated as unoccluded.
@@ -197,7 +197,7 @@ def light_samples(
 ):
     """Add the irradiance of texels from light samples; return the number of shadow rays cast.
 
-    Early out, with 32 or more samples: first, one test ray is traced from each point of sixteen neighbouring
+    Early out, with 32 or more samples: first, one test ray is traced from each point of sixteen consecutive
     texels. If none of these up to 256 rays is blocked, and at least `_MIN_TESTS` rays per texel were traced,
     the texels are treated as unoccluded: their other rays are not traced. If in truth the share p of the
     light is blocked, the expected error with 256 test rays is p (1 - p)^256 of the light, at most 0.15 %. If
@@ -225,8 +225,7 @@ def light_samples(
     any_alpha = False
     if shading is not None:
         any_alpha = len(shading.alpha.slot) > 0
-    # Allow the closed form if emitters are few (see `_SAMPLES_PER_EMITTER`), untextured and opaque. Whether
-    # occluders have alpha is found by the early-out tests.
+    # Allow the closed form if emitters are few (see `_SAMPLES_PER_EMITTER`), untextured and opaque.
     untextured = len(row) * _SAMPLES_PER_EMITTER <= n_samples
     for m in range(len(row) if untextured else 0):
         untextured = untextured and row[m, TEXTURED] == _f(0.0)
@@ -308,8 +307,8 @@ def light_samples(
                             hidden = on[lane] != 0 and rays[TFAR * PACKET_WIDTH + lane] < _f(0.0)
                             on[lane] = 0 if hidden else on[lane]
                             blocked += 1 if hidden else 0
-                        # Count rays through BLEND surfaces as blocked, so that all other rays are traced and
-                        # get their own transmittance. Otherwise the transmittance of all lanes is 1.
+                        # Count rays through BLEND surfaces as blocked. The texels are then not treated as
+                        # unoccluded, so every ray is traced and gets its own transmittance.
                         blocked += count_coloured(buffers.blend)
                     # Look up the radiance of textured emitters.
                     if shading is not None:

@@ -3,7 +3,7 @@
 
     E_indirect = (pi / n) sum (B / pi)    B: radiosity of the texel at the ray's hit, without emission
     E_sky      = (pi / n) sum L_sky       over rays that leave the scene; L_sky: radiance
-    E_emitted  = sum of MIS-weighted hits of emitters, if `area_light` did not use the closed form
+    E_emitted  = sum of MIS-weighted hits of emitters for which `area_light` did not use the closed form
     AO         = share of rays without a hit within a distance
 
 The sums are over the n rays of a texel, whose directions are cosine-weighted.

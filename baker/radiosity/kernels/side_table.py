@@ -47,8 +47,8 @@ new_hits, _saved = scratch((HIT_ROWS * PACKET_WIDTH,), np.float32), scratch((3 *
 class SideTable(NamedTuple):
     """The S split texel entries and their points.
 
-    An entry with a single side is included if a corner of its surface is visible from none of its points. A
-    hit near that corner then contributes no light.
+    An entry with a single side is included if a corner of its surface is visible from none of its points. For
+    a hit near that corner, no visible point is found, so the hit contributes no light.
 
     Attributes
     ----------

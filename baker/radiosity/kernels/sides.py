@@ -59,8 +59,8 @@ def crossed_texels(surface, begin, end, buffers, crossed, side):
     """Find the texels that another surface may pass through, with segments just above each texel's square.
 
     surface : Surface; begin, end : first entry and end of the tested entries; buffers : PacketBuffers
-    crossed : (n,) uint8 output, 1 if a diagonal of the square is blocked at height HIGH or LOW, or an edge of
-        the square at height HIGH
+    crossed : (n,) uint8 output, 1 if a diagonal of the square is blocked at height HIGH or LOW, or if an edge
+        of the square is blocked at height HIGH
     side : (n,) float32 output, metres, root mean square of the texel's width and height
     Returns the number of rays cast.
     """
@@ -252,8 +252,9 @@ def hidden_corners(surface, chosen, origin, normal, height, valid_points, side, 
     """Find texels with a corner that is visible from none of their points, or with a blocked outline.
 
     Each triangle is clipped to the texel's square; the corners and the outline are those of the clipped
-    polygons. Another surface may cut off a corner that contains no point but that rays may hit. The edge
-    between two walls may cross one edge of the polygon. It then blocks the outline between two corners.
+    polygons. Two cases are found. Another surface may separate a part of the texel that contains a corner but
+    none of the points, although rays can hit this part. Or the edge where two walls meet may cross one edge
+    of the polygon and hide no corner, so that the outline between two corners is blocked.
 
     surface : Surface; chosen : (m,) int64, texel entries
     origin, normal : (m, 16, 3) float32, metres and unit vectors, world; height : (m, 16) float32, metres
