@@ -21,8 +21,8 @@ from pathlib import Path
 import numpy as np
 from targets import ANSWERS, TARGETS, scenes_of
 
-# Longest permitted duration of the run with one mutation, seconds. A mutation whose run takes longer is
-# reported.
+# Longest permitted processor time of the run with one mutation, seconds. A mutation whose run takes longer is
+# reported. Elapsed time also depends on other programs.
 LONGEST = 60.0
 
 
@@ -32,10 +32,10 @@ def run_here(name: str, scene: int, seeds: range) -> int:
     with tempfile.TemporaryDirectory() as folder:
         for seed in seeds:
             print(f"seed {seed}", flush=True)
-            begin = time.monotonic()
+            begin = time.process_time()
             found = TARGETS[name](scenes_of(name)[scene], Path(folder), np.random.default_rng(seed))
-            if found is None and time.monotonic() - begin > LONGEST:
-                found = f"took {time.monotonic() - begin:.0f} s"
+            if found is None and time.process_time() - begin > LONGEST:
+                found = f"took {time.process_time() - begin:.0f} s of processor time"
             if found is not None:
                 failures += 1
                 print(f"wrong {name} --scene {scene} --only {seed}\n{found}", flush=True)
