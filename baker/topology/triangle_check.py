@@ -15,6 +15,8 @@ LARGEST_COORDINATE = 1e18
 # having no area. The limit is about the relative spacing of float32 numbers, so the plane of such a triangle
 # is undefined.
 _FLATTEST = 1e-7
+# Number of triangles whose vectors are in the processor's cache.
+_BLOCK = 1 << 14
 
 
 def in_range(
@@ -34,7 +36,10 @@ def in_range(
     (T,) bool
         Whether all three indices are in the range.
     """
-    within: NDArray[np.bool_] = np.asarray((triangle.min(axis=1) >= low) & (triangle.max(axis=1) < high))
+    a, b, c = triangle.T
+    within: NDArray[np.bool_] = np.asarray(
+        (np.minimum(np.minimum(a, b), c) >= low) & (np.maximum(np.maximum(a, b), c) < high)
+    )
     return within
 
 
@@ -52,7 +57,8 @@ def usable_vertices(position: NDArray[np.float32]) -> NDArray[np.bool_]:
         Whether no coordinate is NaN, infinite or beyond `LARGEST_COORDINATE`.
     """
     # Comparisons with NaN are false, so this test also rejects NaN.
-    usable: NDArray[np.bool_] = np.asarray((np.abs(position) <= LARGEST_COORDINATE).all(axis=1))
+    x, y, z = (np.abs(position[:, k]) <= LARGEST_COORDINATE for k in range(3))
+    usable: NDArray[np.bool_] = np.asarray(x & y & z)
     return usable
 
 
@@ -71,17 +77,33 @@ def zero_area(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDA
     (T,) bool
         Whether the height is at most 1e-7 times the longest edge.
     """
-    a, b, c = (position[triangle[:, k]].astype(np.float64) for k in range(3))
+    found = np.zeros(len(triangle), bool)
+    for start in range(0, len(triangle), _BLOCK):
+        block = slice(start, start + _BLOCK)
+        found[block] = _zero_area(position, triangle[block])
+    return found
+
+
+def _zero_area(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return `zero_area` of a few triangles; each array below has one component of all vectors."""
+    a, b, c = (np.ascontiguousarray(position[triangle[:, k]].T, np.float64) for k in range(3))
     ab, ac, bc = b - a, c - a, c - b
     # Divide by the largest component, so that squares of tiny or huge edges do not underflow or overflow.
-    longest = np.maximum(np.maximum(np.abs(ab).max(axis=1), np.abs(ac).max(axis=1)), np.abs(bc).max(axis=1))
-    scale = 1.0 / np.where(longest > 0, longest, 1.0)[:, None]
+    longest = np.abs(np.concatenate([ab, ac, bc])).max(axis=0)
+    scale = 1.0 / np.where(longest > 0, longest, 1.0)
     ab, ac, bc = ab * scale, ac * scale, bc * scale
-    squared = np.maximum(np.maximum((ab * ab).sum(axis=1), (ac * ac).sum(axis=1)), (bc * bc).sum(axis=1))
-    normal = _cross(ab, ac)
-    flat = np.sqrt((normal * normal).sum(axis=1)) <= _FLATTEST * squared
+    squared = np.maximum(np.maximum(_squared(ab), _squared(ac)), _squared(bc))
+    normal = np.stack([ab[k - 2] * ac[k - 1] - ab[k - 1] * ac[k - 2] for k in range(3)])
+    flat = np.sqrt(_squared(normal)) <= _FLATTEST * squared
     found: NDArray[np.bool_] = np.asarray(flat | (longest == 0))
     return found
+
+
+def _squared(vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the squared lengths (n,) of vectors (3, n)."""
+    x, y, z = vector
+    squared: NDArray[np.float64] = x * x + y * y + z * z
+    return squared
 
 
 def face_normal(position: NDArray[np.float32], triangle: NDArray[np.int64]) -> NDArray[np.float64]:

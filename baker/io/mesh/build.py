@@ -132,11 +132,6 @@ def _valid_triangles(
     triangle = np.concatenate([p.triangle + s for p, s in zip(primitives, start, strict=False)])
     owner = np.repeat(np.arange(len(primitives)), [len(p.triangle) for p in primitives])
     stitched = np.array([p.stitched for p in primitives])[owner]
-    repeats = (
-        (triangle[:, 0] == triangle[:, 1])
-        | (triangle[:, 1] == triangle[:, 2])
-        | (triangle[:, 2] == triangle[:, 0])
-    )
 
     def keep(good: NDArray[np.bool_], code: str, what: str) -> None:
         nonlocal triangle, owner
@@ -149,7 +144,9 @@ def _valid_triangles(
             message = f"{some} {what} {verb} left out"
             warnings.append(SceneWarning(code, message, name))
 
-    keep(~(stitched & repeats), "", "")
+    if stitched.any():
+        a, b, c = triangle.T
+        keep(~(stitched & ((a == b) | (b == c) | (c == a))), "", "")
     inside = in_range(triangle, start[owner], start[owner + 1])
     if not inside.all():
         keep(inside, "index-range", "with a vertex number that does not exist")
@@ -164,6 +161,8 @@ def _valid_triangles(
         "duplicate-faces",
         "with the corners of another",
     )
+    if len(primitives) == 1:
+        return [triangle]
     return [triangle[owner == i] - start[i] for i in range(len(primitives))]
 
 
@@ -189,7 +188,8 @@ class _Part:
             return np.repeat(_unit(flat), 3, axis=0).astype(np.float32)
         with np.errstate(over="ignore", invalid="ignore"):
             given = self.source.normal[self.row].astype(np.float64)
-            length = np.sqrt((given * given).sum(axis=1))
+            x, y, z = given.T
+            length = np.sqrt(x * x + y * y + z * z)
             bad = ~(np.isfinite(length) & (length > 1e-12))
         if bad.any():
             some = f"{int(bad.sum())} vertex normals"
@@ -253,7 +253,10 @@ def _texcoord_sets(
 def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
     """Normalise vectors (n, 3)."""
     # Divide by the largest component first, so that squares of tiny or huge vectors stay in range.
-    scaled: NDArray[np.float64] = vector / np.maximum(np.abs(vector).max(axis=1, keepdims=True), 1e-300)
-    length = np.sqrt((scaled * scaled).sum(axis=1, keepdims=True))
-    scaled /= np.maximum(length, 1e-300)
+    # NumPy is several times as fast with whole columns as with the three numbers of each row.
+    x, y, z = np.abs(vector).T
+    scaled: NDArray[np.float64] = vector / np.maximum(np.maximum(np.maximum(x, y), z), 1e-300)[:, None]
+    x, y, z = scaled.T
+    length = np.sqrt(x * x + y * y + z * z)
+    scaled /= np.maximum(length, 1e-300)[:, None]
     return scaled
