@@ -72,6 +72,14 @@ applies. `scene.glb` keeps the animation and the pose of the file: show the pose
 where they were baked. Animations of other values (`KHR_animation_pointer`), such as the visibility of
 nodes, are not read.
 
+## OBJ and MTL
+
+OBJ and MTL files are read as UTF-8, UTF-16 with a byte order mark, or else Latin-1. Lines may end with a
+backslash, and polygons may be concave. Each object and group becomes an object of the scene; `--split
+objects` ignores groups, `--split none` makes one object. The opacity is `d`, or else 1 - `Tr`, times
+`map_d` (its alpha, if it has any, else its red). Programs disagree about `Tr`; a used material of opacity 0
+gives the warning `invisible-material`. The options -o, -s and -clamp of maps are applied.
+
 ## Extensions of glTF
 
 - *read*: what is read of the extension.

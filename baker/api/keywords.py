@@ -97,6 +97,9 @@ class BakeKeywords(TypedDict, total=False):
     # Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.
     missing_textures: Literal["error", "white", "grey", "magenta"]
 
+    # What becomes an object of an OBJ file: each object and group, each object, or the whole file.
+    split: Literal["groups", "objects", "none"]
+
     # Unlit materials of glTF only block light (`block`), or also reflect it like others (`lit`).
     unlit: Literal["block", "lit"]
 
@@ -148,6 +151,7 @@ class AoKeywords(TypedDict, total=False):
     animation: str | float | None
     time: float | None
     missing_textures: Literal["error", "white", "grey", "magenta"]
+    split: Literal["groups", "objects", "none"]
     unlit: Literal["block", "lit"]
     allow_outside: bool
     seed: int
@@ -247,6 +251,9 @@ class LoadKeywords(TypedDict, total=False):
     # Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.
     missing_textures: Literal["error", "white", "grey", "magenta"]
 
+    # What becomes an object of an OBJ file: each object and group, each object, or the whole file.
+    split: Literal["groups", "objects", "none"]
+
     # Unlit materials of glTF only block light (`block`), or also reflect it like others (`lit`).
     unlit: Literal["block", "lit"]
 
@@ -318,6 +325,9 @@ class RenderKeywords(TypedDict, total=False):
 
     # Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.
     missing_textures: Literal["error", "white", "grey", "magenta"]
+
+    # What becomes an object of an OBJ file: each object and group, each object, or the whole file.
+    split: Literal["groups", "objects", "none"]
 
     # Unlit materials of glTF only block light (`block`), or also reflect it like others (`lit`).
     unlit: Literal["block", "lit"]

@@ -224,6 +224,8 @@ def render(
             0.
         missing_textures : Literal["error", "white", "grey", "magenta"], default 'error'
             Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.
+        split : Literal["groups", "objects", "none"], default 'groups'
+            What becomes an object of an OBJ file: each object and group, each object, or the whole file.
         unlit : Literal["block", "lit"], default 'block'
             Unlit materials of glTF only block light (`block`), or also reflect it like others (`lit`).
         allow_outside : bool, default False

@@ -22,6 +22,9 @@ class ReadOptions:
         Seconds from the start of the animation; None uses the pose that the nodes have in the file.
     missing_textures : str
         "error", or the colour of textures that cannot be read: "white", "grey" or "magenta".
+    split : str
+        What becomes a mesh of an OBJ file: "groups" (each object and group), "objects", or "none" (the whole
+        file).
     unlit : str
         "block" or "lit": whether unlit materials only block light, or are like other materials.
     """
@@ -31,6 +34,7 @@ class ReadOptions:
     animation: str | None = None
     time: float | None = None
     missing_textures: str = "error"
+    split: str = "groups"
     unlit: str = "block"
 
     @classmethod

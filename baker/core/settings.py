@@ -145,6 +145,11 @@ class CommonSettings(Settings):
         "Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.",
         group=SCENE,
     )
+    split: Literal["groups", "objects", "none"] = setting(
+        "groups",
+        "What becomes an object of an OBJ file: each object and group, each object, or the whole file.",
+        group=SCENE,
+    )
     unlit: Literal["block", "lit"] = setting(
         "block",
         "Unlit materials of glTF only block light (`block`), or also reflect it like others (`lit`).",

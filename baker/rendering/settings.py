@@ -83,6 +83,7 @@ class RenderSettings(Settings):
     missing_textures: Literal["error", "white", "grey", "magenta"] = same_setting(
         BakeSettings, "missing_textures"
     )
+    split: Literal["groups", "objects", "none"] = same_setting(BakeSettings, "split")
     unlit: Literal["block", "lit"] = same_setting(BakeSettings, "unlit")
     allow_outside: bool = same_setting(BakeSettings, "allow_outside")
     seed: int = same_setting(BakeSettings, "seed")

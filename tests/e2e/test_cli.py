@@ -127,6 +127,7 @@ OTHER = {
     "animation": ("walk", "walk"),
     "time": ("1.5", 1.5),
     "missing_textures": ("grey", "grey"),
+    "split": ("none", "none"),
     "unlit": ("lit", "lit"),
     "seed": ("7", 7),
     "threads": ("1", 1),

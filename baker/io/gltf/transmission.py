@@ -17,12 +17,11 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from baker.core.scene import Material, SceneWarning, Texture
+from baker.io.alpha_texture import channel, lowest_alpha, same_mapping, with_alpha
 from baker.io.gltf.json import JsonObject
 from baker.io.gltf.texture import TextureReader
-from baker.io.images import resized
 
 TRANSMISSION = "KHR_materials_transmission"
 
@@ -57,7 +56,7 @@ def as_pane(
     if extension is None or share == 0.0:
         return made
     base = made.base_colour_texture
-    if made.alpha_mode != "OPAQUE" and (made.base_colour[3] < 1.0 or _lowest_alpha(base) < 1.0):
+    if made.alpha_mode != "OPAQUE" and (made.base_colour[3] < 1.0 or lowest_alpha(base) < 1.0):
         message = (
             f"the material '{made.name}' has alpha and transmits light ({TRANSMISSION}); its alpha is used, "
             "its transmission is not: make it OPAQUE to use its transmission"
@@ -65,8 +64,8 @@ def as_pane(
         warnings.append(SceneWarning("transmission", message, made.name))
         return made
     texture = textures.read(extension, "transmissionTexture", made.name, warnings)
-    if texture is not None and base is not None and not _same_place(texture, base):
-        share *= float(_red(texture.image).mean())
+    if texture is not None and base is not None and not same_mapping(texture, base):
+        share *= float(channel(texture, 0).mean())
         message = (
             f"the transmission texture of material '{made.name}' has other uv or another sampler than its "
             "base colour texture; the mean of the texture is used"
@@ -130,43 +129,11 @@ def _attenuation(material: JsonObject) -> tuple[float, ...]:
     return tuple(min(c, 1.0) ** (thickness / (2.0 * distance)) for c in colour)
 
 
-def _same_place(a: Texture, b: Texture) -> bool:
-    """Return whether two textures of a material have the same uv and wrap modes."""
-    return a.texcoord == b.texcoord and a.wrap == b.wrap and np.array_equal(a.transform, b.transform)
-
-
-def _lowest_alpha(texture: Texture | None) -> float:
-    if texture is None:
-        return 1.0
-    return float(texture.image[..., 3].min()) / (255.0 if texture.image.dtype == np.uint8 else 1.0)
-
-
-def _red(image: NDArray[np.uint8] | NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the red values of an image as they are stored, 0 to 1."""
-    scale = np.float32(255.0 if image.dtype == np.uint8 else 1.0)
-    return np.asarray(image[..., 0], np.float32) / scale
-
-
 def _with_transmission(base: Texture | None, texture: Texture | None, share: float) -> Texture | None:
     """Return the base colour texture with the alpha 1 - share x transmission texture."""
-    if texture is None:
-        return (
-            base if base is None or _lowest_alpha(base) == 1.0 else replace(base, image=_opaque(base.image))
-        )
-    if base is None:
-        image = np.full((*texture.image.shape[:2], 4), 255, np.uint8)
-        image[..., 3] = np.rint(255.0 * (1.0 - share * _red(texture.image)))
-        return replace(texture, image=image)
-    height = max(base.image.shape[0], texture.image.shape[0])
-    width = max(base.image.shape[1], texture.image.shape[1])
-    red = _red(resized(texture.image, width, height))
-    image = _opaque(resized(base.image, width, height))
-    full = 255.0 if image.dtype == np.uint8 else 1.0
-    image[..., 3] = np.rint(full * (1.0 - share * red)) if full > 1.0 else 1.0 - share * red
-    return replace(base, image=image)
-
-
-def _opaque(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    out = image.copy()
-    out[..., 3] = 255 if image.dtype == np.uint8 else 1
-    return out
+    if texture is not None:
+        return with_alpha(base, texture, np.float32(1.0) - np.float32(share) * channel(texture, 0))
+    if base is None or lowest_alpha(base) == 1.0:
+        return base
+    # The alpha of OPAQUE materials has no effect.
+    return with_alpha(base, base, np.ones((1, 1), np.float32))

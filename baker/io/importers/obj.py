@@ -6,6 +6,7 @@ v = 0 is the last image row. In glTF and in `Scene` it is the first, so the impo
 
 from __future__ import annotations
 
+import codecs
 import hashlib
 import math
 import re
@@ -51,14 +52,14 @@ def import_obj(source: SceneFile) -> Scene:
     file = str(source.path)
     digest = hashlib.sha256(source.data)
     warnings: list[SceneWarning] = []
-    text = _decode(source.data)
+    text = without_groups(_decode(source.data), source.options.split)
     colour = source.options.missing_textures
     missing = None if colour == "error" else (colour, warnings)
     materials = _read_libraries(text, source.path, source.folder, digest, warnings, missing=missing)
     reader = _parse(text, materials, file)
     attributes = reader.GetAttrib()
     position = np.array(attributes.vertices, np.float64).reshape(-1, 3)
-    position = _restore_nan(source.data, position)
+    position = _restore_nan(text.encode(), position)
     corners = _Corners(
         position=to_world(position, source.up, source.scale),
         normal=to_world(np.array(attributes.normals, np.float64).reshape(-1, 3), source.up, 1.0),
@@ -74,7 +75,17 @@ def import_obj(source: SceneFile) -> Scene:
             message = f"faces without a known material are grey; MTL names {len(materials)}"
             warnings.append(SceneWarning("no-material", message, source.path.name))
         materials.append(GREY)
+    used = {p.material for _, primitives in groups for p in primitives}
+    warnings += [_vanished(m.name) for k, m in enumerate(materials) if k in used and m.base_colour[3] == 0.0]
     return scene_of_meshes(source, groups, materials, warnings, digest.hexdigest())
+
+
+def _vanished(name: str) -> SceneWarning:
+    message = (
+        f"the opacity of the material '{name}' is 0 (d 0 or Tr 1): it is invisible and blocks no light; "
+        "write d 1 if it is opaque"
+    )
+    return SceneWarning("invisible-material", message, name)
 
 
 def obj_sha256(path: Path, data: bytes, folder: SceneFolder) -> str:
@@ -109,10 +120,36 @@ def obj_sha256(path: Path, data: bytes, folder: SceneFolder) -> str:
 
 
 def _decode(data: bytes) -> str:
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return data.decode("latin-1")
+    """Return the text of an OBJ or MTL file, with lines joined that end with a backslash."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        text = data.decode("utf-16", "replace")
+    else:
+        try:
+            text = data.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = data.decode("latin-1")
+    return re.sub(r"\\[ \t]*\r?\n", " ", text) if "\\" in text else text
+
+
+def without_groups(text: str, split: str) -> str:
+    """Return an OBJ file without the statements that begin another mesh.
+
+    Parameters
+    ----------
+    text : str
+        The file.
+    split : str
+        "groups" keeps objects and groups, "objects" removes groups, and "none" removes both.
+
+    Returns
+    -------
+    str
+        The file, with the same number of lines.
+    """
+    if split == "groups":
+        return text
+    letters = "g" if split == "objects" else "go"
+    return re.sub(rf"^[ \t]*[{letters}](?=[ \t\r\n]|$)[^\r\n]*", "", text, flags=re.MULTILINE)
 
 
 def _read_libraries(

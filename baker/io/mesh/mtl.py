@@ -1,6 +1,6 @@
 """Reads Wavefront material libraries (MTL): the statements for diffuse reflection, emission and opacity.
 
-Reflectance = Kd x map_Kd, emission = Ke x map_Ke (cd/m2), opacity = d or 1 - Tr.
+Reflectance = Kd x map_Kd, emission = Ke x map_Ke (cd/m2), opacity = (d or 1 - Tr) x map_d.
 
 Based on: Alias|Wavefront, Advanced Visualizer manual, appendix B.1; `Ke` and `map_Ke` as commonly written.
 """
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from baker.core.errors import InputError
 from baker.core.scene import Material, SceneWarning, Texture
+from baker.io.alpha_texture import channel, lowest_alpha, same_mapping, with_alpha
 from baker.io.images import decode_image, stand_in
 from baker.io.scene_folder import OutsideError, OutsideName
 
@@ -186,13 +187,21 @@ def _material(
     elif words.get("tr"):
         opacity = 1.0 - _number(words["tr"][-1], "Tr", file, name)
     opacity = min(max(opacity, 0.0), 1.0)
+    base_texture, opacity_texture = texture(name, words.get("map_kd")), texture(name, words.get("map_d"))
+    if opacity_texture is not None:
+        if base_texture is not None and not same_mapping(base_texture, opacity_texture):
+            message = "map_d and map_Kd have different options; give both the same -s, -o and -clamp"
+            raise InputError(message, file=file, object=name)
+        # Many exporters name the image of map_Kd, whose alpha is the opacity. Else the image is grey.
+        number = 3 if lowest_alpha(opacity_texture) < 1.0 else 0
+        base_texture = with_alpha(base_texture, opacity_texture, channel(opacity_texture, number))
     return Material(
         name=name,
         base_colour=(red, green, blue, opacity),
-        base_colour_texture=texture(name, words.get("map_kd")),
+        base_colour_texture=base_texture,
         emission=colour("ke", 1.0 if emission_texture is not None and "ke" not in words else 0.0),
         emission_texture=emission_texture,
-        alpha_mode="OPAQUE" if opacity == 1.0 else "BLEND",
+        alpha_mode="OPAQUE" if opacity == 1.0 and opacity_texture is None else "BLEND",
         metallic=0.0,
     )
 

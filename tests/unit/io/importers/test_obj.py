@@ -219,3 +219,70 @@ def test_a_colour_replaces_a_missing_picture(tmp_path, image):
     assert scene.materials[0].base_colour == (0.5, 0.25, 1, 1)
     assert [w.object for w in scene.warnings if w.code == "missing-texture"] == ["a"]
     assert scene.sha256 == scene_sha256(tmp_path / "a.obj")
+
+
+@pytest.mark.parametrize(
+    ("split", "names"), [("groups", ["a", "b", "c"]), ("objects", ["a", "c"]), ("none", ["shape_0"])]
+)
+def test_objects_and_groups_become_meshes(tmp_path, split, names):
+    text = SQUARE + "o a\nf 1 2 3\n g b\nf 1 3 4\no c\nf 2 3 4\n"
+    scene = load(tmp_path, text, options=ReadOptions(split=split))
+    assert [i.name for i in scene.instances] == names
+    assert area(scene) == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-be", "latin-1"])
+def test_encodings_and_continued_lines(tmp_path, encoding):
+    text = "mtllib m.mtl\no M\u00fchle\n" + SQUARE + "usemtl gr\u00fcn\nf 1 2 \\\r\n 3 4\n"
+    mark = "\ufeff" if encoding == "utf-16-be" else ""
+    (tmp_path / "m.mtl").write_bytes((mark + "newmtl gr\u00fcn\nKd 0 \\\n1 0\n").encode(encoding))
+    scene = load(tmp_path, (mark + text).encode(encoding))
+    assert scene.instances[0].name == "M\u00fchle"
+    assert scene.materials[scene.meshes[0].material[0]].base_colour == (0, 1, 0, 1)
+    assert area(scene) == pytest.approx(1)
+
+
+def test_polygons_with_a_notch_are_cut_along_their_edges(tmp_path):
+    corners = [(0, 0), (3, 0), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0, 3)]
+    text = "".join(f"v {x} {y} 0\n" for x, y in corners) + "f 1 2 3 4 5 6 7 8\n"
+    scene = load(tmp_path, text)
+    # A U of area 7: triangles of a fan would cover the notch and overlap.
+    assert area(scene) == pytest.approx(7)
+    mesh = scene.meshes[0]
+    middle = mesh.position[mesh.triangle].mean(axis=1)
+    assert not ((np.abs(middle[:, 0] - 1.5) < 0.5) & (middle[:, 1] > 1)).any()
+
+
+def opacity_of(tmp_path, statements):
+    (tmp_path / "m.mtl").write_text("newmtl a\nKd 0.5 0.5 0.5\n" + statements)
+    scene = load(tmp_path, "mtllib m.mtl\nusemtl a\n" + SQUARE + "f 1 2 3\n")
+    return scene.materials[scene.meshes[0].material[0]], codes(scene)
+
+
+def test_a_material_that_vanishes_is_told(tmp_path):
+    for statements in ("Tr 1\n", "d 0\n"):
+        material, told = opacity_of(tmp_path, statements)
+        assert (material.base_colour[3], list(told)) == (0, ["invisible-material"])
+    for statements in ("", "d 1\nTr 1\n", "d 1\nTr 0\n", "Tr 0\n"):
+        material, told = opacity_of(tmp_path, statements)
+        assert (material.base_colour[3], material.alpha_mode, told) == (1, "OPAQUE", {})
+
+
+def test_map_d_is_the_alpha_of_the_base_colour(tmp_path):
+    colours = np.uint8([[[10, 20, 30], [40, 50, 60]]])
+    Image.fromarray(colours).save(tmp_path / "kd.png")
+    Image.fromarray(np.uint8([[0], [255]])).save(tmp_path / "d.png")
+    material, _ = opacity_of(tmp_path, "map_Kd kd.png\nmap_d d.png\nd 0.5\n")
+    image = material.base_colour_texture.image
+    np.testing.assert_array_equal(image[..., :3], np.repeat(colours, 2, axis=0))
+    np.testing.assert_array_equal(image[..., 3], [[0, 0], [255, 255]])
+    assert (material.base_colour[3], material.alpha_mode) == (0.5, "BLEND")
+    material, _ = opacity_of(tmp_path, "map_d -clamp on d.png\n")
+    np.testing.assert_array_equal(material.base_colour_texture.image[..., 3], [[0], [255]])
+    assert material.base_colour_texture.wrap == ("clamp", "clamp")
+    # If the image has alpha, its alpha is the opacity.
+    Image.fromarray(np.uint8([[[9, 9, 9, 77]]])).save(tmp_path / "rgba.png")
+    material, _ = opacity_of(tmp_path, "map_Kd rgba.png\nmap_d rgba.png\n")
+    np.testing.assert_array_equal(material.base_colour_texture.image, [[[9, 9, 9, 77]]])
+    with pytest.raises(InputError, match="different options"):
+        opacity_of(tmp_path, "map_Kd kd.png\nmap_d -s 2 2 d.png\n")
