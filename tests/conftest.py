@@ -4,7 +4,8 @@ Rules for the processes:
 
 - tests of a module that has module-wide, package-wide or session-wide fixtures run in the same process;
 - tests that compile the same functions run in the same process. Only kernels are stored on disk. The
-  functions that are compiled into kernels are compiled by each process, and so are kernels of tests;
+  functions that are compiled into kernels are compiled by each process, and so are kernels of tests. Tests
+  that parse the source run in the same process, too;
 - if one process compiles a kernel, the other process waits and loads it from disk;
 - tests that fork many times run first, while the processes are small, and then the largest groups;
 - a test that measures seconds (marked `timed`) runs while the other processes are idle.
@@ -35,13 +36,14 @@ _FORKING = {"test_recovery.py"}
 # {name of a group: pattern in the text of its files}
 _SUBJECTS = {
     "path tracer": r"from (baker\.(pathtracer|rendering|verification)|reference_runs)",
+    "source": r"(?m)^import ast$",
     "kernels": r"import (carray|njit)|from (inner|packet_driver) import",
 }
 
 
 @cache
 def subject(path: Path) -> str | None:
-    """Return the name of the group of files whose tests compile the same functions, or None."""
+    """Return the name of the group of files whose tests compile or parse the same code, or None."""
     text = path.read_text("utf-8")
     return next((name for name, pattern in _SUBJECTS.items() if re.search(pattern, text)), None)
 
