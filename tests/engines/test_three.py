@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import json
+import re
+from pathlib import Path
 
+import numpy as np
 import pytest
+from browser import need_modules, page_at, serve
 from engine_scenes import QUADRANT, probe_expected, srgb_page, write_probe
+from PIL import Image
 from proof import (
     changed,
     draw,
@@ -35,6 +41,26 @@ def test_standard_materials_are_a_little_darker(browser, probe):
 def test_exposure_multiplies(browser, probe):
     picture = draw(browser, probe / "three", camera="front", options='{"exposure": 0.25}')
     assert shows_the_probe(picture, probe_expected() * 0.25, rel=0.001)
+
+
+def test_the_page_of_the_docs_shows_a_bake(browser, probe, tmp_path):
+    text = (Path(__file__).parents[2] / "docs" / "engines" / "three.md").read_text("utf-8")
+    (found,) = re.findall(r"```html\n(<!doctype html>.*?)```", text, re.DOTALL)
+    (tmp_path / "index.html").write_text(found.replace('"./', '"/').replace("'./", "'/"))
+    with (
+        serve({"page": tmp_path, "out": probe, "node_modules": need_modules()}) as address,
+        page_at(browser, f"{address}/page/index.html") as (page, troubles),
+    ):
+        page.wait_for_selector("canvas")
+        levels = np.zeros(1)
+        for _ in range(20):
+            picture = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("L"))
+            levels = np.unique(picture[60:-60, 60:-60])
+            if len(levels) > 3:
+                break
+            page.wait_for_timeout(500)
+    assert troubles == []
+    assert len(levels) > 3, "the page stays empty"
 
 
 def test_a_room_of_known_radiosity(browser, room):
