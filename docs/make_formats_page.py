@@ -80,6 +80,30 @@ objects` ignores groups, `--split none` makes one object. The opacity is `d`, or
 `map_d` (its alpha, if it has any, else its red). Programs disagree about `Tr`; a used material of opacity 0
 gives the warning `invisible-material`. The options -o, -s and -clamp of maps are applied.
 
+## Data of glTF
+
+- Only glTF 2.0 is read. For a file of glTF 1.0, the error names a converter, `npx gltf-pipeline`.
+- Accessors may be sparse, have a stride, or have no data (zeros). Sparse data is written as plain data.
+- Quantised vertices (`KHR_mesh_quantization`) are read with all types, and keep their types in `scene.glb`.
+- Triangles, strips and fans are read. Points and lines are left out with a warning. All stay in
+  `scene.glb`, strips and fans as triangles.
+- If an object has levels of detail (`MSFT_lod`), its first level is baked. Lower levels stay in `scene.glb`
+  without a lightmap, also if their `TEXCOORD_1` equals that of the first level.
+- Cameras are kept. `render` uses them, and a solid with a camera inside counts as a room.
+
+## Compressed glTF
+
+Draco and meshopt data is decoded when a file is read. The numbers equal those of the decoders of npm
+(`draco3dgltf`, `meshoptimizer`) bit by bit. Where a file also has the data uncompressed (a fallback buffer,
+or accessors with data beside Draco), that data is used. Sizes that a file states are checked before memory is
+allocated. Draco is decoded in a separate process. On Linux, this process may use 1 GiB and eight times the
+size of the decoded mesh, and 8 s of processor time and 2 s for each MB of compressed data; on other systems
+only its run time is limited, to ten times as long.
+
+`scene.glb` and fixed files are not compressed, and there is no option for it. Compressors round `TEXCOORD_1`
+and reorder vertices, and no maintained Python package encodes meshopt. Compress `scene.glb` after the bake:
+[AFTER.md](AFTER.md) has the flags of gltf-transform and gltfpack that keep the lightmap uv precise.
+
 ## Extensions of glTF
 
 - *read*: what is read of the extension.

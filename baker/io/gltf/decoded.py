@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from baker.core.errors import InputError
 from baker.io.gltf.compact import drop_words
 from baker.io.gltf.document import GltfDocument
-from baker.io.gltf.packer import Json, extensions_of, objects, view_span
+from baker.io.gltf.packer import Json, extensions_of, is_index, objects, view_span
 from baker.io.regular_file import LARGEST
 
 
@@ -35,7 +35,7 @@ class DecodedData:
         self._number = len(document.buffers)
         self._parts: list[NDArray[np.uint8]] = []
         self._dead: dict[int, list[tuple[int, int]]] = {}
-        self._left: set[Any] = set()
+        self._left: set[int] = set()
         self.length = 0
         self.faults: dict[str, InputError] = {}
 
@@ -45,7 +45,8 @@ class DecodedData:
 
     def append(self, view: Json, data: NDArray[np.uint8]) -> None:
         """Append (N,) uint8 to the new buffer, and let a view refer to it."""
-        self._left.add(view.get("buffer"))
+        if is_index(view.get("buffer")):
+            self._left.add(view["buffer"])
         view["buffer"], view["byteOffset"], view["byteLength"] = self._number, self.length, len(data)
         self._parts += [data, np.zeros(-len(data) % 4, np.uint8)]
         self.length += len(data) + -len(data) % 4
@@ -71,7 +72,8 @@ class DecodedData:
             buffers.append(b"".join(part.data for part in self._parts))
             self._root["buffers"].append({"byteLength": self.length})
         # Forget the errors of placeholder buffers, which stand for uncompressed data that is not in the file.
-        for number in self._left - {holder.get("buffer") for holder in _holders(self._root)}:
+        named = (holder.get("buffer") for holder in _holders(self._root))
+        for number in self._left - set(filter(is_index, named)):
             if faults.pop(number, None) is not None:
                 buffers[number] = b""
         for name in names:

@@ -19,7 +19,7 @@ from baker.io.gltf.dangling import holders_with
 from baker.io.gltf.decoded import DecodedData, is_listed, remove_extension
 from baker.io.gltf.document import GltfDocument
 from baker.io.gltf.json import JsonObject
-from baker.io.gltf.packer import ARRAY_BUFFER, COMPONENT, ELEMENT_ARRAY_BUFFER, Json
+from baker.io.gltf.packer import ARRAY_BUFFER, COMPONENT, ELEMENT_ARRAY_BUFFER, Json, is_index
 
 DRACO = "KHR_draco_mesh_compression"
 _WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
@@ -178,7 +178,8 @@ class _Reader:
     def drop_streams(self) -> None:
         """Remove the compressed data that nothing refers to any more."""
         root = self._document.root.value
-        used = {holder["bufferView"] for holder in holders_with(root, "bufferView")}
+        named = (holder["bufferView"] for holder in holders_with(root, "bufferView"))
+        used = set(filter(is_index, named))
         for stream in sorted(self._meshes.keys() - used):
             view = root["bufferViews"][stream]
             self._decoded.drop(view["buffer"], view.get("byteOffset", 0), view["byteLength"])

@@ -119,3 +119,12 @@ def test_a_broken_stream_that_is_not_needed_is_a_warning(tmp_path):
 def test_fixed_files_are_compared_with_the_decoded_scene(tmp_path):
     scene = write(tmp_path / "a.glb", compress(builder()))
     check_readable(tmp_path / "b.glb", builder().glb(), scene, allow_outside=False)
+
+
+@pytest.mark.parametrize("reference", [{}, [0], "0", None, -1])
+def test_malformed_references_to_buffers_do_not_stop_the_decoder(tmp_path, reference):
+    packed = compress(builder())
+    packed.json["bufferViews"][-1]["buffer"] = reference
+    for view in packed.json["bufferViews"][:-1]:
+        view["buffer"] = reference
+    assert load_scene(write(tmp_path / "a.glb", packed)).n_triangles == 2

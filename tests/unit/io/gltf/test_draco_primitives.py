@@ -162,3 +162,10 @@ def test_wrong_counts_are_corrected(tmp_path):
     for accessor in builder.json["accessors"]:
         accessor["count"] = 7
     assert load(tmp_path, builder).n_triangles == load(tmp_path, plain()).n_triangles
+
+
+@pytest.mark.parametrize("reference", [{}, [0], "0", None, -1])
+def test_malformed_references_elsewhere_do_not_stop_the_decoder(tmp_path, reference):
+    builder = packed()
+    builder.json["images"][0]["bufferView"] = reference
+    assert load(tmp_path, builder).n_triangles == load(tmp_path, plain()).n_triangles
