@@ -18,7 +18,7 @@ TOP_TABLE = "bake"
 # Names of all tables that a configuration file may have.
 TABLES = ("bake", "check", "verify", "render", "diff", "repair")
 # Lists whose values on the command line are added to the values in the file instead of replacing them.
-_ADDED = {"ignore"}
+_ADDED = {"ignore", "object"}
 
 
 def read_config(path: Path, name: str = TOP_TABLE) -> dict[str, Any]:

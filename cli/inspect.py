@@ -9,6 +9,7 @@ import typer
 
 from baker.cli.command import Run, command
 from baker.core.printable import printable
+from baker.core.settings import BakeSettings
 from baker.io.settings import InspectSettings
 
 # Largest number of items of a list in text output without -v. The number of the other items follows.
@@ -19,7 +20,15 @@ LONGEST = 24
 
 # No ray is traced here, but the flags of ray tracing are accepted, so that scripts can pass them to all
 # commands.
-@command("inspect", InspectSettings)
+# Settings of a bake that have no flag here: all but those of objects.
+_NO_FLAG = {
+    name: field.default
+    for name, field in BakeSettings.model_fields.items()
+    if name not in {"include", "exclude", "object", "name_rules", *InspectSettings.model_fields}
+}
+
+
+@command("inspect", InspectSettings, BakeSettings, fixed=_NO_FLAG)
 def inspect(
     ctx: typer.Context,
     path: Annotated[
@@ -33,11 +42,30 @@ def inspect(
     from baker.io.inspect import inspect_path
 
     run: Run = ctx.obj
-    found = inspect_path(path, run.of(InspectSettings))
+    own = run.of(InspectSettings)
+    objects = {"objects": run.of(BakeSettings)} if own.objects else {}
+    found = inspect_path(path, own, **objects)
     if run.as_json:
         run.session.write_json(found)
+    elif own.objects and not run.quiet:
+        table = [_object_row(row) for row in found["objects"]]
+        write_tree({**found, "objects": table}, run.text, limit=None)
     elif not run.quiet:
         write_tree(found, run.session.out, limit=None if run.verbose else SHOWN)
+
+
+def _object_row(row: dict[str, Any]) -> dict[str, Any]:
+    """Return the cells of an object in the table of `--objects`."""
+    given = {
+        key: str(value).lower() if isinstance(value, bool) else value
+        for key, value in row["settings"].items()
+    }
+    return {
+        "node": row["node"],
+        "name": row["name"],
+        "settings": ", ".join(f"{key}={value}" for key, value in given.items()),
+        "why": "; ".join(dict.fromkeys(row["reasons"].values())),
+    }
 
 
 def write_tree(value: Any, stream: TextIO, *, depth: int = 0, limit: int | None = SHOWN) -> None:

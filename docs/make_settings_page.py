@@ -10,8 +10,9 @@ import sys
 from pathlib import Path
 
 from baker.checks.settings import CheckSettings
-from baker.cli.fields import default_of, flag_of, is_switch, metavar_of, range_of, unit_of
+from baker.cli.fields import default_of, flag_of, is_switch, kinds_of, metavar_of, range_of, unit_of
 from baker.comparison.settings import DiffSettings
+from baker.core.object_settings import ObjectSettings
 from baker.core.settings import BakeSettings
 from baker.core.settings_model import Settings
 from baker.jobs.settings import BatchSettings
@@ -60,6 +61,16 @@ TABLE = """
 |---|---|---|---|---|---|---|
 """
 
+OBJECTS = """
+## object
+
+Keys of the setting `object`, of tables `[[object]]` in the configuration file, and of `extras.baker` in glTF
+files. [OBJECTS.md](OBJECTS.md) describes where they may be set and which value wins.
+
+| key | value | range | default | meaning |
+|---|---|---|---|---|
+"""
+
 TAIL = """
 ## The configuration file
 
@@ -99,12 +110,22 @@ def rows(model: type[Settings]) -> list[str]:
     return found
 
 
+def object_rows() -> list[str]:
+    """Return a row of the table for each setting of an object."""
+    found = []
+    for name, field in ObjectSettings.model_fields.items():
+        value = "true or false" if bool in kinds_of(field) else f"`{metavar_of(field)}`".replace("|", "\\|")
+        default = f"`{str(field.default).lower()}`" if field.default not in (None, "") else ""
+        found.append(f"| `{name}` | {value} | {range_of(field)} | {default} | {field.description} |")
+    return found
+
+
 def page() -> str:
     """Return the text of the page."""
     parts = [HEAD]
     for model, title, intro in SECTIONS:
         parts.append(f"\n## {title}\n\n{intro}\n{TABLE}" + "\n".join(rows(model)) + "\n")
-    return "".join(parts) + TAIL
+    return "".join(parts) + OBJECTS + "\n".join(object_rows()) + "\n" + TAIL
 
 
 if __name__ == "__main__":

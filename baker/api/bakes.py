@@ -57,6 +57,8 @@ def bake(
             Texels per metre; adds pages as needed.
         max_pages : int, 1 to 256, default 16
             Largest number of pages if `density` is set.
+        budget : str | None, default None
+            Number of pages and their width, such as 2x1024: all objects get the largest density that fits.
         padding : int, texels, 0 to 64, default 4
             Empty texels between charts.
         uv : Literal["auto", "keep", "unwrap"], default 'auto'
@@ -91,6 +93,11 @@ def bake(
             Bake only objects with these node names or node paths; `*` and `?` are wildcards.
         exclude : str | Sequence[str], default ()
             Leave out objects and lights with these node names or node paths, and their descendants.
+        object : str | Sequence[str], default ()
+            Settings of the objects with these node names or node paths, and of their descendants.
+        name_rules : bool, default True
+            Leave out collision hulls and lower levels of detail, recognised by their names, like
+            `UCX_Wall`.
         up : Literal["y", "z"], default 'y'
             Up axis, for file formats that do not specify one.
         scale : float, m, above 0, default 1.0

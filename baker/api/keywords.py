@@ -25,6 +25,10 @@ class BakeKeywords(TypedDict, total=False):
     # Largest number of pages if `density` is set.
     max_pages: int
 
+    # Number of pages and their width, such as 2x1024: all objects get the largest density that
+    # fits.
+    budget: str | None
+
     # Empty texels between charts.
     padding: int
 
@@ -74,6 +78,13 @@ class BakeKeywords(TypedDict, total=False):
 
     # Leave out objects and lights with these node names or node paths, and their descendants.
     exclude: str | Sequence[str]
+
+    # Settings of the objects with these node names or node paths, and of their descendants.
+    object: str | Sequence[str]
+
+    # Leave out collision hulls and lower levels of detail, recognised by their names, like
+    # `UCX_Wall`.
+    name_rules: bool
 
     # Up axis, for file formats that do not specify one.
     up: Literal["y", "z"]
@@ -128,6 +139,7 @@ class AoKeywords(TypedDict, total=False):
     resolution: int
     density: float | None
     max_pages: int
+    budget: str | None
     padding: int
     uv: Literal["auto", "keep", "unwrap"]
     unwrapper: Literal["xatlas"]
@@ -144,6 +156,8 @@ class AoKeywords(TypedDict, total=False):
     export: str | Sequence[str]
     include: str | Sequence[str]
     exclude: str | Sequence[str]
+    object: str | Sequence[str]
+    name_rules: bool
     up: Literal["y", "z"]
     scale: float
     scene_name: str | float | None
@@ -331,6 +345,19 @@ class RenderKeywords(TypedDict, total=False):
 
     # Unlit materials of glTF only block light (`block`), or also reflect it like others (`lit`).
     unlit: Literal["block", "lit"]
+
+    # Bake only objects with these node names or node paths; `*` and `?` are wildcards.
+    include: str | Sequence[str]
+
+    # Leave out objects and lights with these node names or node paths, and their descendants.
+    exclude: str | Sequence[str]
+
+    # Settings of the objects with these node names or node paths, and of their descendants.
+    object: str | Sequence[str]
+
+    # Leave out collision hulls and lower levels of detail, recognised by their names, like
+    # `UCX_Wall`.
+    name_rules: bool
 
     # Also read referenced files outside the scene's folder.
     allow_outside: bool

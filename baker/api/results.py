@@ -228,6 +228,15 @@ def render(
             What becomes an object of an OBJ file: each object and group, each object, or the whole file.
         unlit : Literal["block", "lit"], default 'block'
             Unlit materials of glTF only block light (`block`), or also reflect it like others (`lit`).
+        include : str | Sequence[str], default ()
+            Bake only objects with these node names or node paths; `*` and `?` are wildcards.
+        exclude : str | Sequence[str], default ()
+            Leave out objects and lights with these node names or node paths, and their descendants.
+        object : str | Sequence[str], default ()
+            Settings of the objects with these node names or node paths, and of their descendants.
+        name_rules : bool, default True
+            Leave out collision hulls and lower levels of detail, recognised by their names, like
+            `UCX_Wall`.
         allow_outside : bool, default False
             Also read referenced files outside the scene's folder.
         seed : int, 0 to 2147483647, default 0

@@ -19,7 +19,7 @@ def ao_layers(transport: Transport) -> tuple[Layer, ...]:
         raise ValueError("the ao channel needs ambient occlusion")
     # Compute the binomial standard error. Because rays are stratified, it is an upper bound, measured as 2 to
     # 5 times the true error. Half a ray is added to the hits and to the misses, so that the error is never 0.
-    n = max(transport.ao_samples, 1)
+    n = np.maximum(transport.ao_samples, 1)
     bounded = (share.astype(np.float64) * n + 0.5) / (n + 1.0)
     error = np.sqrt(bounded * (1.0 - bounded) / n).astype(np.float32)
     return (Layer(share[:, None], error, bound=True),)

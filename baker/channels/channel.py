@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,7 +32,7 @@ class Transport:
         Results of the final gather.
     ambient_occlusion : (n_front,) float32 or None
         Cosine-weighted share of the hemisphere without a hit within the AO distance; 1 is unoccluded.
-    ao_samples : int
+    ao_samples : (n_front,) int32 or int
         Number of rays for each value of `ambient_occlusion`.
     gap : (n_front,) bool or None
         True for texels in a gap about a texel wide.
@@ -41,7 +41,7 @@ class Transport:
     direct: DirectLight | None = None
     gathered: Gathered | None = None
     ambient_occlusion: NDArray[np.float32] | None = None
-    ao_samples: int = 0
+    ao_samples: NDArray[np.int32] | int = 0
     gap: NDArray[np.bool_] | None = None
 
 
@@ -66,6 +66,11 @@ class Layer:
     error: NDArray[np.float32]
     bound: bool = False
     kept: NDArray[np.bool_] | None = None
+
+    def first(self, n: int) -> Layer:
+        """Return the layer of the first `n` texels."""
+        kept = None if self.kept is None else self.kept[:n]
+        return replace(self, value=self.value[:n], error=self.error[:n], kept=kept)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -162,7 +162,7 @@ def compare(
     settings = settings or DiffSettings()
     start = time.monotonic()
     report(progress, Stage.LOAD, 0.0)
-    first, second = read_bake(a), read_bake(b)
+    first, second = read_bake(a).with_texels(), read_bake(b).with_texels()
     names = [n for n in first.maps if n in second.maps and first.maps[n].shape[3] == second.maps[n].shape[3]]
     if not names:
         raise InputError("the bakes have no channel in common", file=str(b))

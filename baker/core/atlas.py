@@ -40,6 +40,8 @@ class InstanceLayout:
         Whether the uv is TEXCOORD_1 of the scene file, up to scale and offset.
     texels_per_metre : float
         Mean number of texels along one metre of surface.
+    receives : bool
+        Whether the instance has texels in the lightmap. Otherwise its page is hidden, see `Atlas.n_hidden`.
     """
 
     instance: int
@@ -50,6 +52,7 @@ class InstanceLayout:
     chart: NDArray[np.int32]
     kept: bool
     texels_per_metre: float
+    receives: bool = True
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -61,11 +64,15 @@ class Atlas(Result):
     resolution : int
         Page width and height in texels.
     n_pages : int
+        Number of pages of the lightmap.
     layouts : tuple of InstanceLayout, in the order of `Scene.instances`
     n_charts : int
     padding : int
         Number of empty texels between charts. Charts of a kept TEXCOORD_1 may be closer.
     warnings : tuple of SceneWarning
+    n_hidden : int
+        Number of hidden pages, whose numbers follow those of the lightmap. They contain the objects that
+        reflect light and have no texels in the lightmap. They are not written.
     """
 
     resolution: int
@@ -74,6 +81,7 @@ class Atlas(Result):
     n_charts: int
     padding: int
     warnings: tuple[SceneWarning, ...] = ()
+    n_hidden: int = 0
 
     def summary(self) -> dict[str, Any]:
         """Return the names and values that `repr` and notebooks show."""

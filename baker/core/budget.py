@@ -82,7 +82,7 @@ def texels_and_pages(settings: BakeSettings, area: float) -> tuple[int, int]:
     Parameters
     ----------
     settings : BakeSettings
-        `resolution`, `density` and `max_pages` are read.
+        `resolution`, `density`, `budget` and `max_pages` are read.
     area : float
         Area of all surfaces, m2.
 
@@ -95,7 +95,8 @@ def texels_and_pages(settings: BakeSettings, area: float) -> tuple[int, int]:
     """
     page = settings.resolution**2
     if settings.density is None:
-        return round(FILLED * page), 1
+        pages = 1 if settings.budget is None else settings.max_pages
+        return round(FILLED * page * pages), pages
     texels = area * settings.density**2
     pages = min(max(math.ceil(texels / (FILLED_AT_DENSITY * page)), 1), settings.max_pages)
     return round(min(texels, FILLED * page * pages)), pages

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 # Number of significant digits, and number of decimals above which a number is written with an exponent.
 _DIGITS, _DECIMALS = 3, 6
@@ -79,3 +80,24 @@ def amount(value: float) -> str:
         if math.isfinite(value) and size <= abs(value) < 1e15:
             return f"{number(value / size)} {word}"
     return number(value)
+
+
+def joined_names(names: Sequence[str], most: int = 3) -> str:
+    """Return names in quotes, separated by commas; after `most` names, the number of the others.
+
+    Parameters
+    ----------
+    names : sequence of str
+        The names.
+    most : int
+        Largest number of names that are written.
+
+    Returns
+    -------
+    str
+        "'a', 'b' and 'c'", or "'a', 'b', 'c' and 7 others".
+    """
+    shown = [f"'{name}'" for name in names[:most]]
+    rest = len(names) - len(shown)
+    shown += [f"{rest} other{'s' if rest > 1 else ''}"] if rest else []
+    return " and ".join(filter(None, (", ".join(shown[:-1]), shown[-1]))) if shown else ""

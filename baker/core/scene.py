@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.object_settings import NEUTRAL, ObjectSettings
 from baker.core.origin import scene_origin
 from baker.core.printable import message_line
 from baker.core.result import Result
@@ -80,6 +81,9 @@ class Material:
     reflects : bool
         Whether the surface reflects light. If False, its albedo is 0 in a bake; `base_colour` is only the
         colour in which it is displayed.
+    original : int or None
+        If the material is a copy with changes that the settings of an object require: the index of the
+        material in the scene that it is a copy of. Such copies are not written to files.
     """
 
     name: str = ""
@@ -95,6 +99,7 @@ class Material:
     metallic_roughness_texture: Texture | None = None
     reflectance: float | None = None
     reflects: bool = True
+    original: int | None = None
 
 
 @dataclass(frozen=True)
@@ -142,12 +147,18 @@ class Instance:
     mesh : int
         Index into `Scene.meshes`.
     world_from_object : (4, 4) float64
+    settings : ObjectSettings
+        Settings of this object, such as whether it casts shadows.
+    reasons : mapping of str to str
+        Where each setting that was given comes from, by key.
     """
 
     node: int
     name: str
     mesh: int
     world_from_object: NDArray[np.float64]
+    settings: ObjectSettings = NEUTRAL
+    reasons: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -271,6 +282,8 @@ class Scene(Result):
         None for formats other than glTF, for which the writer creates a new document.
     sha256 : str
         SHA-256 of the scene file and of the files that it refers to, in hexadecimal digits.
+    left_out : tuple of Instance
+        Instances that are not baked. Their meshes are in `meshes` if the scene has no `source`.
     source_scene : SourceScene or None
         All triangles of the file, invalid ones included. None unless the scene was loaded with
         `lenient=True`.
@@ -287,6 +300,7 @@ class Scene(Result):
     sha256: str = ""
     cameras: tuple[Camera, ...] = ()
     source_scene: SourceScene | None = None
+    left_out: tuple[Instance, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """Return the names and values that `repr` and notebooks show."""
@@ -331,6 +345,10 @@ class Scene(Result):
         if not self.origin.any():
             return self.lights
         return tuple(replace(light, position=self.to_local(light.position)) for light in self.lights)
+
+    def object_flags(self, key: str) -> NDArray[np.bool_]:
+        """Return (I,) bool: the value of a field or property of `ObjectSettings` for each instance."""
+        return np.array([getattr(instance.settings, key) for instance in self.instances], bool)
 
     def to_local(self, position: Sequence[float]) -> tuple[float, float, float]:
         """Return `position` (3,), metres, world, minus `origin`."""

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 from baker.core.encoding import encoding_options, encodings_in_words
 from baker.core.errors import SettingsError
 from baker.core.light_limits import BRIGHTEST
+from baker.core.object_settings import ObjectRules
 from baker.core.settings_model import (
     FILES,
     SCENE,
@@ -52,6 +53,12 @@ class CommonSettings(Settings):
         group=BAKE,
     )
     max_pages: int = setting(16, "Largest number of pages if `density` is set.", ge=1, le=256, group=PAGES)
+    budget: str | None = setting(
+        None,
+        "Number of pages and their width, such as 2x1024: all objects get the largest density that fits.",
+        metavar="NxSIZE",
+        group=PAGES,
+    )
     padding: int = setting(4, "Empty texels between charts.", unit="texels", ge=0, le=64, group=PAGES)
     uv: Literal["auto", "keep", "unwrap"] = setting(
         "auto", "Keep TEXCOORD_1 as lightmap uv, or unwrap; `auto` keeps it if it is valid.", group=PAGES
@@ -102,6 +109,18 @@ class CommonSettings(Settings):
         (),
         "Leave out objects and lights with these node names or node paths, and their descendants.",
         repeated=True,
+        group=SCENE,
+    )
+    object: ObjectRules = setting(
+        (),
+        "Settings of the objects with these node names or node paths, and of their descendants.",
+        repeated=True,
+        metavar="'GLOB KEY=VALUE ...'",
+        group=SCENE,
+    )
+    name_rules: bool = setting(
+        True,
+        "Leave out collision hulls and lower levels of detail, recognised by their names, like `UCX_Wall`.",
         group=SCENE,
     )
     up: Literal["y", "z"] = setting("y", "Up axis, for file formats that do not specify one.", group=SCENE)
@@ -158,6 +177,18 @@ class CommonSettings(Settings):
     allow_outside: bool = allow_outside_setting()
     seed: int = seed_setting()
     threads: int | None = threads_setting()
+
+    @classmethod
+    def complete(cls, values: dict[str, Any]) -> dict[str, Any]:
+        """Return the values with `resolution` and `max_pages` set to those of `budget`."""
+        if values.get("budget") is None:
+            return values
+        pages, width = parse_budget(values["budget"])
+        for name, value in (("max_pages", pages), ("resolution", width)):
+            if str(values.get(name, value)) != str(value):
+                message = f"`budget` and `{name}` contradict each other; leave one out"
+                raise SettingsError(f"{message} (was '{values['budget']}')", object="budget")
+        return {**values, "max_pages": pages, "resolution": width}
 
     def check(self) -> None:
         """Raise `SettingsError` if `sky` or `ao_distance` is invalid, or `channels` is empty."""
@@ -228,6 +259,32 @@ def ao_metres(distance: str, diagonal: float) -> float:
             object="ao_distance",
         )
     return metres
+
+
+def parse_budget(text: object) -> tuple[int, int]:
+    """Return the number of pages and the width of a page of the setting `budget`.
+
+    Parameters
+    ----------
+    text : object
+        A text such as "2x1024".
+
+    Returns
+    -------
+    pages : int
+    width : int
+        Texels.
+
+    Raises
+    ------
+    SettingsError
+        If the text has another form.
+    """
+    numbers = str(text).lower().split("x")
+    if len(numbers) != 2 or not all(number.strip().isdecimal() for number in numbers):
+        message = "`budget` is not a number of pages and their width, like 2x1024"
+        raise SettingsError(f"{message} (was {text!r})", object="budget")
+    return int(numbers[0]), int(numbers[1])
 
 
 def parse_sky(text: str) -> tuple[float, float, float]:

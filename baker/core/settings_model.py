@@ -115,6 +115,8 @@ def _plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "dtype") and hasattr(value, "tolist") else value
 
 
+# Marks a type whose values a function converts before validation.
+Convert = BeforeValidator
 # A list of names, given as a list or as one text with commas.
 Names = Annotated[tuple[str, ...], BeforeValidator(_split)]
 # A list of texts that may contain commas, given as a list or, if it has one element, as a text.
@@ -150,7 +152,7 @@ class Settings(BaseModel):
                 raise SettingsError(f"'{key}' is given twice", object=key)
             clean[name] = value
         try:
-            super().__init__(**clean)
+            super().__init__(**type(self).complete(clean))
         except ValidationError as error:
             first = error.errors()[0]
             name = str(first["loc"][0]) if first["loc"] else ""
@@ -165,6 +167,11 @@ class Settings(BaseModel):
         raise SettingsError(
             f"settings are not changed in place; changed({name}=...) returns a copy", object=name
         )
+
+    @classmethod
+    def complete(cls, values: dict[str, Any]) -> dict[str, Any]:
+        """Return the given values by name, with those of settings that follow from other settings."""
+        return values
 
     def check(self) -> None:
         """Raise `SettingsError` for invalid values or combinations that types and bounds do not exclude."""

@@ -116,6 +116,15 @@ class TexelBuffer:
         shape = (self.resolution, self.resolution, *value.shape[1:])
         return image.reshape(shape if page is not None else (n_pages, *shape))
 
+    def without_hidden(self, n_pages: int) -> TexelBuffer:
+        """Return the buffer without the front entries of hidden pages, which are the last front entries.
+
+        n_pages : number of pages that are not hidden
+        """
+        pixels = self.resolution * self.resolution
+        n_front = int(np.searchsorted(self.pixel[: self.n_front] // pixels, n_pages))
+        return replace(self, n_pages=n_pages, n_front=n_front)
+
     def with_copies(self, entry: NDArray[np.int32]) -> TexelBuffer:
         """Return the buffer with copies of the entries `entry` (m,) appended.
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from baker.core.atlas import Atlas
 from baker.core.budget import patch_rays
-from baker.core.parallel import Part, TileRunner
+from baker.core.parallel import Part
 from baker.core.progress import silent
 from baker.core.scene import Scene
 from baker.core.settings import BakeSettings
@@ -25,19 +25,21 @@ from baker.core.stage import Stage
 from baker.pipeline.prepare import PreparedScene, prepare_scene
 from baker.pipeline.record import Record
 from baker.pipeline.transport import (
+    PartRunner,
     trace_ambient_occlusion,
     trace_direct_light,
     trace_final_gather,
 )
 from baker.radiosity.form_factors import cast_rows
 from baker.radiosity.patches import build_patches
+from baker.radiosity.sample_parts import SamplePart
 
 Span = tuple[int, int]
 Result = list[tuple[int, int, Part]]
 # Results of earlier stages, arrays by name.
 Arrays = Mapping[str, NDArray[Any]]
-# Function that runs a prepared stage with the given tile runner.
-StageWork = Callable[[TileRunner], object]
+# Function that runs a prepared stage with the given runners of the parts of the entries.
+StageWork = Callable[[PartRunner], object]
 
 
 @dataclass
@@ -84,7 +86,8 @@ class TileWorker:
         def run(n: int, tile: int, work: Callable[[int, int], Part], **rest: Any) -> None:
             found.extend((begin, end, work(begin, end)) for begin, end in spans)
 
-        run_stage(run)
+        wanted = int(arrays.get("part", 0))
+        run_stage(lambda part: run if part.number == wanted else _skip)
         return found
 
     def _stage(self, stage: Stage, arrays: Arrays) -> StageWork:
@@ -103,25 +106,31 @@ class TileWorker:
             return self._ready[1]
 
 
+def _skip(*arguments: Any, **rest: Any) -> None:
+    """Compute no tile: the runner of parts that a task does not belong to."""
+
+
 def _direct_light(prepared: PreparedScene, arrays: Arrays) -> StageWork:
-    return lambda run: trace_direct_light(prepared, run)
+    return lambda runs: trace_direct_light(prepared, runs)
 
 
 def _form_factors(prepared: PreparedScene, arrays: Arrays) -> StageWork:
     patches = build_patches(prepared.texels, arrays["level"], link=prepared.sides.link)
     seen = prepared.sides.seen_patches(patches.patch)
     n_rays = patch_rays(prepared.settings)
-    return lambda run: cast_rows(patches, seen, prepared.job.on(run), n_rays=n_rays)
+    # Patches are not divided into parts.
+    whole = SamplePart(0, 1.0, None, prepared.texels.n_front)
+    return lambda runs: cast_rows(patches, seen, prepared.job.on(runs(whole)), n_rays=n_rays)
 
 
 def _final_gather(prepared: PreparedScene, arrays: Arrays) -> StageWork:
     # Copy the array, because arrays of a task are read-only and `seen_light` writes to a column.
     seen = prepared.sides.seen_light(np.array(arrays["exitance"]))
-    return lambda run: trace_final_gather(prepared, seen, arrays["analytic"], run)
+    return lambda runs: trace_final_gather(prepared, seen, arrays["analytic"], runs)
 
 
 def _ambient_occlusion(prepared: PreparedScene, arrays: Arrays) -> StageWork:
-    return lambda run: trace_ambient_occlusion(prepared, run)
+    return lambda runs: trace_ambient_occlusion(prepared, runs)
 
 
 # Keys: stages with tiles. Values: functions that prepare the stage from the results of earlier stages.

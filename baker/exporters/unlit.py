@@ -42,7 +42,7 @@ class UnlitExport:
 
     def write(self, bake: Path, target: Path) -> None:
         """Write the files of the export into `target`."""
-        stored = read_bake(bake)
+        stored = read_bake(bake).with_texels()
         page, covered = radiance(stored)
         exposure = exposure_for(page[..., :3], covered)
         (target / "scene.glb").write_bytes(unlit_glb(stored, page, exposure))

@@ -13,6 +13,7 @@ from baker.core.encoding import encoding_of
 from baker.core.errors import InputError
 from baker.core.lightmap import TexelStatus
 from baker.core.scene import Scene
+from baker.core.settings import BakeSettings
 from baker.io.bake.recovery import MANIFEST_NAME, recover
 from baker.io.output_path import not_text
 from baker.io.regular_file import read_regular
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
     from baker.io.settings import LoadSettings
 
 
-def inspect_path(path: Path | str, settings: LoadSettings | None = None) -> dict[str, Any]:
+def inspect_path(
+    path: Path | str, settings: LoadSettings | None = None, objects: BakeSettings | None = None
+) -> dict[str, Any]:
     """Describe a scene file, an output folder (or its bake.json), or an image that baker can read.
 
     Parameters
@@ -30,6 +33,9 @@ def inspect_path(path: Path | str, settings: LoadSettings | None = None) -> dict
         A file or a folder.
     settings : LoadSettings, optional
         How a scene file is read.
+    objects : BakeSettings, optional
+        For a scene: list the objects with the settings that they have in a bake with these settings. The
+        other contents of the scene are left out.
 
     Returns
     -------
@@ -62,7 +68,34 @@ def inspect_path(path: Path | str, settings: LoadSettings | None = None) -> dict
     from baker.io.load import load_scene_as
     from baker.io.settings import LoadSettings
 
-    return _scene(path, load_scene_as(path, settings or LoadSettings()))
+    scene = load_scene_as(path, settings or LoadSettings())
+    return _scene(path, scene) if objects is None else _objects(path, scene, objects)
+
+
+def _objects(path: Path, scene: Scene, settings: BakeSettings) -> dict[str, Any]:
+    """Return each object of a scene, the settings that it has in a bake, and where they come from."""
+    from baker.io.object_rules import apply_object_settings
+
+    baked = apply_object_settings(scene, settings)
+    found = []
+    for instance in sorted((*baked.instances, *baked.left_out), key=lambda i: i.node):
+        given = instance.settings.given()
+        found.append(
+            {
+                "node": instance.node,
+                "name": instance.name,
+                "baked": not instance.settings.exclude,
+                "settings": given,
+                "reasons": {key: instance.reasons[key] for key in given},
+            }
+        )
+    warnings = [w for w in baked.warnings if w not in scene.warnings]
+    return {
+        "kind": "objects",
+        "path": str(path),
+        "objects": found,
+        "warnings": [{"code": w.code, "message": w.message, "object": w.object} for w in warnings],
+    }
 
 
 def _bake(folder: Path) -> dict[str, Any]:

@@ -18,7 +18,8 @@ from baker.core.light_limits import check_brightness
 from baker.core.read_options import AS_IN_FILE, ReadOptions
 from baker.core.registry import Registry
 from baker.core.scene import Scene
-from baker.io.choose import choose_objects
+from baker.io.level import LEVEL_SUFFIXES, read_level
+from baker.io.object_rules import apply_object_settings
 from baker.io.regular_file import read_regular
 from baker.io.scene_folder import SceneFolder
 
@@ -89,7 +90,7 @@ def load_scene(
     Parameters
     ----------
     path : Path or str
-        A file with a suffix that is registered in `IMPORTERS`.
+        A file with a suffix that is registered in `IMPORTERS`, or a level file (`baker.io.level`).
     up : str
         "y" or "z", the up axis of files whose format does not define an up axis. glTF is always +Y up.
     scale : float
@@ -130,6 +131,20 @@ def load_scene(
         raise SettingsError(
             f"`scale` is not a positive number of metres per unit (was {scale!r})", object="scale"
         )
+    if path.suffix.lower() in LEVEL_SUFFIXES:
+
+        def load_placed(file: Path) -> Scene:
+            return load_scene(
+                file,
+                up=up,
+                scale=scale,
+                options=options,
+                reflections=reflections,
+                lenient=lenient,
+                allow_outside=allow_outside,
+            )
+
+        return read_level(path, load_placed)
     data = read_scene_file(path)
     importer = _importer_of(path)
     if not data:
@@ -147,7 +162,7 @@ def _importer_of(path: Path) -> Importer:
     """Return the importer for the suffix of a file."""
     importer = IMPORTERS.get(path.suffix.lower())
     if importer is None:
-        known = ", ".join(IMPORTERS.names())
+        known = ", ".join([*IMPORTERS.names(), LEVEL_SUFFIXES[0]])
         what = (
             f"'{path.suffix}' is not a known scene format" if path.suffix else "the file name has no suffix"
         )
@@ -156,33 +171,34 @@ def _importer_of(path: Path) -> Importer:
 
 
 def load_for_bake(path: Path | str, settings: BakeSettings, *, lenient: bool = False) -> Scene:
-    """Read a scene file with a bake's settings for up axis, scale and the selection of objects.
+    """Read a scene file with a bake's settings for up axis, scale and objects.
 
     Parameters
     ----------
     path : Path or str
         The scene file.
     settings : BakeSettings
-        `up`, `scale`, `allow_outside`, `include`, `exclude` and the members of `ReadOptions` are used.
+        `up`, `scale`, `allow_outside`, `include`, `exclude`, `object`, `name_rules` and the members of
+        `ReadOptions` are used.
     lenient : bool
         As in `load_scene`.
 
     Returns
     -------
     Scene
-        The scene with the objects that the patterns select.
+        The scene with the settings of its objects, without objects that are left out.
 
     Raises
     ------
     InputError
-        As in `load_scene`, and if the patterns select no object.
+        As in `load_scene` and `apply_object_settings`.
     SettingsError
         As in `load_scene`.
     ResourceError
         As in `load_scene`.
     """
     scene = load_scene_as(path, settings, lenient=lenient)
-    return choose_objects(scene, settings.include, settings.exclude)
+    return apply_object_settings(scene, settings)
 
 
 def load_scene_as(path: Path | str, settings: BakeSettings | LoadSettings, *, lenient: bool = False) -> Scene:

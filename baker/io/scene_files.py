@@ -10,6 +10,7 @@ from typing import Any
 from baker.core.errors import InputError
 from baker.io.gltf.chunks import MAGIC, split_glb
 from baker.io.gltf.uri import file_names, is_data
+from baker.io.level import LEVEL_SUFFIXES, level_files
 from baker.io.regular_file import LARGEST_PART, read_regular
 
 
@@ -30,6 +31,8 @@ def scene_files(path: Path) -> list[Path]:
     try:
         if path.suffix.lower() in (".glb", ".gltf"):
             return [path, *(path.parent / name for name in _gltf_names(read_regular(path), str(path)))]
+        if path.suffix.lower() in LEVEL_SUFFIXES:
+            return [path, *(file for placed in level_files(path) for file in scene_files(placed))]
         if path.suffix.lower() == ".obj":
             return [path, *_obj_files(path)]
     except (OSError, ValueError, RecursionError, InputError):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 from baker.core.settings import BakeSettings
-from baker.core.settings_model import RunSettings, Settings, Text, same_setting
+from baker.core.settings_model import SCENE, RunSettings, Settings, Text, same_setting, setting
 
 
 class LoadSettings(Settings):
@@ -31,3 +31,5 @@ class InspectSettings(RunSettings, LoadSettings):
     """The settings of `baker inspect`."""
 
     what: ClassVar[str] = "setting"
+
+    objects: bool = setting(False, "List the settings of each object, and where they come from.", group=SCENE)

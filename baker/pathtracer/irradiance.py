@@ -149,7 +149,7 @@ def ambient_occlusion_pass(
             name = rows = begin + near_together(position[begin:end, 0])
         found = np.zeros((end - begin, 1))
         open_rays(
-            position[rows], normal[rows], face_normal[rows], name, new_path_memory(reference.rays),
+            position[rows], normal[rows], face_normal[rows], name, new_path_memory(reference.occluders),
             arguments, sobol_points, shared, max_distance, alike, sizes, number, salt, found,
         )  # fmt: skip
         add_pass(estimate, rows, found / samples)

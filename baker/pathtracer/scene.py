@@ -97,6 +97,8 @@ class Reference:
         All lights that paths sample.
     rays : RayScene
         The Embree scene.
+    occluders : RayScene
+        The Embree scene of the objects that AO rays hit; usually the same object as `rays`.
     sphere : (4,) float64
         Centre and radius, metres, of a sphere that encloses all vertices.
     threads : int
@@ -111,6 +113,7 @@ class Reference:
     surfaces: Surfaces
     lights: LightTable
     rays: RayScene
+    occluders: RayScene
     sphere: NDArray[np.float64]
     threads: int
     hit_kind: NDArray[np.uint8]
@@ -132,6 +135,7 @@ class Reference:
     def close(self) -> None:
         """Release the Embree scene. No ray can be traced afterwards."""
         self.rays.close()
+        self.occluders.close()
 
 
 def build_reference(
@@ -172,15 +176,76 @@ def build_reference(
     count = thread_count(threads)
     geometry = world_geometry(scene, _no_atlas(scene))
     shading = resolve_materials(scene, geometry, reflections=not lambertian)
-    rays = build_ray_tree(geometry, shading, threads=count)
+    steered = find_steered(scene, geometry)
+    rays = build_ray_tree(geometry, shading, threads=count, unseen=steered.unseen)
+    occluders = rays
+    if (steered.unseen != steered.unseen_by_ao).any():
+        occluders = build_ray_tree(geometry, shading, threads=count, unseen=steered.unseen_by_ao)
     lights = build_light_table(scene, geometry, shading, sky)
     surfaces = _surfaces(geometry, shading, lights, lambertian)
+    if steered.black.any():
+        surfaces = blacken(surfaces, steered.black)
     hit_kind = np.zeros(len(geometry.triangle), np.uint8)
     if find_solids:
         # Only `inside_geometry` reads `hit_kind`. Paths use `doubleSided` of the materials, which
         # `hide_backs` does not change.
         hit_kind = hide_backs(scene, geometry, shading)[1]
-    return Reference(geometry, shading, surfaces, lights, rays, _sphere(geometry), count, hit_kind)
+    sphere = _sphere(geometry)
+    return Reference(geometry, shading, surfaces, lights, rays, occluders, sphere, count, hit_kind)
+
+
+class Steered(NamedTuple):
+    """What the settings of objects change for the path tracer.
+
+    Attributes
+    ----------
+    unseen, unseen_by_ao : (I,) bool
+        Instances that no ray hits, and instances that no AO ray hits.
+    black : (T,) bool
+        Triangles that reflect nothing.
+    """
+
+    unseen: NDArray[np.bool_]
+    unseen_by_ao: NDArray[np.bool_]
+    black: NDArray[np.bool_]
+
+
+def find_steered(scene: Scene, geometry: Geometry) -> Steered:
+    """Read the settings of objects, without the functions that a bake uses for that.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene, with the settings of its instances.
+    geometry : Geometry
+        The scene's triangles.
+
+    Returns
+    -------
+    Steered
+        The instances and triangles that are treated differently.
+    """
+    unseen, hidden_from_ao, dull = [], [], []
+    for instance in scene.instances:
+        own = instance.settings
+        unseen.append(not own.cast)
+        hidden_from_ao.append(not own.cast if own.visible_to_ao is None else not own.visible_to_ao)
+        dull.append(not own.bounce)
+    black = np.array(dull, bool)[geometry.instance]
+    return Steered(np.array(unseen, bool), np.array(hidden_from_ao, bool), black)
+
+
+def blacken(surfaces: Surfaces, black: NDArray[np.bool_]) -> Surfaces:
+    """Return the surfaces with a black material on the triangles that `black` (T,) selects.
+
+    Transmittance is computed from the materials of the scene, and does not change.
+    """
+    row, material = surfaces.row, np.zeros((1, MATERIAL_LENGTH), np.float32)
+    # The specular reflection of a black metal is black.
+    material[0, MATERIAL_METALLIC] = material[0, MATERIAL_ROUGHNESS] = 1.0
+    row[black, MATERIAL] = len(surfaces.material)
+    row[black, TEXTURED] = 0.0
+    return surfaces._replace(material=np.concatenate([surfaces.material, material]))
 
 
 def _no_atlas(scene: Scene) -> Atlas:

@@ -163,13 +163,16 @@ def _trace(
     if any(channel.needs_light for channel in channels.values()):
         precompile.wait_for_rays(compiling, record.progress)
     transport = trace_transport(prepared, channels, record, executor)
-    prepared.rays.close()
+    prepared.close()
     executor.close()
-    texels = prepared.texels.without_surface()
+    texels = prepared.texels.without_surface().without_hidden(atlas.n_pages)
     valid = prepared.job.valid_points[: texels.n_front] != 0
     # Half floats are precise enough for the suggested exposure and take half of the memory.
     albedo = prepared.texels.albedo[: texels.n_front].astype(np.float16)
-    layers = {name: channel.layers(transport) for name, channel in channels.items()}
+    layers = {
+        name: tuple(layer.first(texels.n_front) for layer in channel.layers(transport))
+        for name, channel in channels.items()
+    }
     return TracedTexels(texels, valid, albedo, layers)
 
 

@@ -20,7 +20,9 @@ from baker.lights.emissive import build_emitters
 from baker.pipeline.record import Record
 from baker.radiosity.emitter_choice import EmitterSampling
 from baker.radiosity.inside_geometry import find_inside_geometry
+from baker.radiosity.object_reflection import without_reflection
 from baker.radiosity.point_cache import new_point_cache
+from baker.radiosity.sample_parts import SamplePart, sample_parts
 from baker.radiosity.sides import Sides, split_texels
 from baker.radiosity.texels import build_texels
 from baker.radiosity.trace_job import TraceJob
@@ -46,7 +48,9 @@ class PreparedScene:
     texels : TexelBuffer
         The n texel entries: fronts, backs, and further sides of split texels.
     rays : RayScene
-        Ray tree; the caller of `prepare_scene` closes it.
+        Ray tree.
+    occluders : RayScene or None
+        Ray tree of the objects that AO rays hit; None if these are the objects of `rays`.
     emitters : Emitters
         Emissive triangles and parts of triangles, grouped in clusters.
     hit_kind : (T,) uint8
@@ -58,6 +62,8 @@ class PreparedScene:
         Result of splitting texels into sides.
     job : TraceJob
         Data of the n entries that all ray stages share.
+    parts : list of SamplePart
+        Parts of the entries with equal numbers of rays.
     """
 
     scene: Scene
@@ -66,11 +72,19 @@ class PreparedScene:
     shading: Shading
     texels: TexelBuffer
     rays: RayScene
+    occluders: RayScene | None
     emitters: Emitters
     hit_kind: NDArray[np.uint8]
     outside: NDArray[np.uint16]
     sides: Sides
     job: TraceJob
+    parts: list[SamplePart]
+
+    def close(self) -> None:
+        """Release the ray trees."""
+        self.rays.close()
+        if self.occluders is not None:
+            self.occluders.close()
 
     @property
     def sampling(self) -> EmitterSampling:
@@ -105,7 +119,7 @@ def prepare_scene(
     Returns
     -------
     PreparedScene
-        The caller closes it with `rays.close()`.
+        The caller closes it with `close`.
     """
     threads = thread_count(settings.threads)
     with record.stage(Stage.TEXELS):
@@ -115,8 +129,13 @@ def prepare_scene(
         texels, surface = build_texels(
             geometry, shading, atlas, seed=settings.seed, threads=threads, progress=record.progress
         )
+        texels = without_reflection(scene, texels)
     with record.stage(Stage.RAY_TREE):
-        rays = build_ray_tree(geometry, shading, threads=threads)
+        seen, occludes = scene.object_flags("cast"), scene.object_flags("blocks_ao")
+        rays = build_ray_tree(geometry, shading, threads=threads, unseen=~seen)
+        occluders = None
+        if (seen != occludes).any():
+            occluders = build_ray_tree(geometry, shading, threads=threads, unseen=~occludes)
         emitters = build_emitters(geometry, shading)
         lookup = build_triangle_lookup(geometry, texels, emitters)
     every = np.full(texels.n, 0xFFFF, np.uint16)
@@ -137,5 +156,17 @@ def prepare_scene(
         point_cache=new_point_cache(texels.n),
     )
     return PreparedScene(
-        scene, settings, geometry, shading, texels, rays, emitters, hit_kind, outside, sides, job
+        scene=scene,
+        settings=settings,
+        geometry=geometry,
+        shading=shading,
+        texels=texels,
+        rays=rays,
+        occluders=occluders,
+        emitters=emitters,
+        hit_kind=hit_kind,
+        outside=outside,
+        sides=sides,
+        job=job,
+        parts=sample_parts(scene, texels),
     )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +22,12 @@ from baker.radiosity.form_factors import build_form_factors
 from baker.radiosity.kernels.side_table import SeenLight
 from baker.radiosity.narrow_gaps import gap_level
 from baker.radiosity.patches import NARROW, build_patches
+from baker.radiosity.sample_parts import SamplePart
 from baker.radiosity.solve import energy_audit, solve_radiosity
 from baker.radiosity.trapped_light import light_warnings
+
+# Returns the runner of the tiles of a part of the entries.
+PartRunner = Callable[[SamplePart], TileRunner]
 
 
 def trace_transport(
@@ -57,14 +62,33 @@ def trace_transport(
         transport = _light(prepared, record, executor)
     if any(channel.needs_ambient_occlusion for channel in channels.values()):
         gathered = transport.gathered
-        if gathered is not None and ao_samples == n_samples:
-            return replace(transport, ambient_occlusion=gathered.open, ao_samples=ao_samples)
+        rays = _ao_rays(prepared, ao_samples)
+        if gathered is not None and ao_samples == n_samples and prepared.occluders is None:
+            return replace(transport, ambient_occlusion=gathered.open, ao_samples=rays)
         with record.stage(Stage.AMBIENT_OCCLUSION):
-            run = executor.runner(Stage.AMBIENT_OCCLUSION, {"outside": prepared.outside})
-            opened = trace_ambient_occlusion(prepared, run)
-            record.rays[Stage.AMBIENT_OCCLUSION] = prepared.texels.n_front * ao_samples
-        transport = replace(transport, ambient_occlusion=opened, ao_samples=ao_samples)
+            runs = _runs(executor, Stage.AMBIENT_OCCLUSION, {"outside": prepared.outside})
+            opened = trace_ambient_occlusion(prepared, runs)
+            record.rays[Stage.AMBIENT_OCCLUSION] = int(rays.sum())
+        transport = replace(transport, ambient_occlusion=opened, ao_samples=rays)
     return transport
+
+
+def _runs(executor: TileExecutor, stage: Stage, arrays: Mapping[str, NDArray[Any]]) -> PartRunner:
+    """Return the runner of each part of a stage. Only workers of a cluster read the number of the part."""
+
+    def runner(part: SamplePart) -> TileRunner:
+        number = {"part": np.array(part.number)} if part.entry is not None else {}
+        return executor.runner(stage, {**arrays, **number})
+
+    return runner
+
+
+def _ao_rays(prepared: PreparedScene, ao_samples: int) -> NDArray[np.int32]:
+    """Return (n_front,) int32: the number of AO rays of each front texel."""
+    rays = np.zeros(prepared.texels.n_front, np.int32)
+    for part in prepared.parts:
+        rays[part.front_rows] = part.rays(ao_samples)
+    return rays
 
 
 def _light(prepared: PreparedScene, record: Record, executor: TileExecutor) -> Transport:
@@ -72,7 +96,7 @@ def _light(prepared: PreparedScene, record: Record, executor: TileExecutor) -> T
     texels = prepared.texels
     with record.stage(Stage.DIRECT_LIGHT):
         direct = trace_direct_light(
-            prepared, executor.runner(Stage.DIRECT_LIGHT, {"outside": prepared.outside})
+            prepared, _runs(executor, Stage.DIRECT_LIGHT, {"outside": prepared.outside})
         )
         record.rays[Stage.DIRECT_LIGHT] = direct.rays
     with record.stage(Stage.FORM_FACTORS):
@@ -84,37 +108,52 @@ def _light(prepared: PreparedScene, record: Record, executor: TileExecutor) -> T
     # Free the direct light of all entries, because the code below does not use it.
     direct = replace(direct, complete=np.zeros((0, 3), np.float32))
     with record.stage(Stage.FINAL_GATHER):
-        run = executor.runner(
+        runs = _runs(
+            executor,
             Stage.FINAL_GATHER,
             {"outside": prepared.outside, "exitance": exitance, "analytic": direct.analytic},
         )
         seen = prepared.sides.seen_light(exitance)
         del exitance
-        gathered = trace_final_gather(prepared, seen, direct.analytic, run)
+        gathered = trace_final_gather(prepared, seen, direct.analytic, runs)
         record.rays[Stage.FINAL_GATHER] = gathered.rays
     return Transport(direct=direct, gathered=gathered, gap=level[: texels.n_front] >= NARROW)
 
 
-def trace_direct_light(prepared: PreparedScene, run: TileRunner) -> DirectLight:
+def trace_direct_light(prepared: PreparedScene, runs: PartRunner) -> DirectLight:
     """Return the direct light of all texels.
 
     Parameters
     ----------
     prepared : PreparedScene
         The scene and the settings of the bake.
-    run : TileRunner
-        Runs the tiles. Results of tiles that it skips stay 0.
+    runs : PartRunner
+        Returns the runner of the tiles of a part. Results of tiles that it skips stay 0.
 
     Returns
     -------
     DirectLight
         Direct light of all n entries.
     """
-    return direct_light(prepared.job.on(run), prepared.scene.local_lights, prepared.sampling)
+    found = [
+        direct_light(
+            part.job(prepared.job).on(runs(part)),
+            prepared.scene.local_lights,
+            part.sampling(prepared.sampling),
+        )
+        for part in prepared.parts
+    ]
+    if len(found) == 1:
+        return found[0]
+    whole = DirectLight.zeros(prepared.texels.n, sum(one.rays for one in found))
+    for part, one in zip(prepared.parts, found, strict=True):
+        for name in ("weighted", "complete", "variance", "analytic"):
+            getattr(whole, name)[part.rows] = getattr(one, name)
+    return whole
 
 
 def trace_final_gather(
-    prepared: PreparedScene, seen: SeenLight, analytic: NDArray[np.uint8], run: TileRunner
+    prepared: PreparedScene, seen: SeenLight, analytic: NDArray[np.uint8], runs: PartRunner
 ) -> Gathered:
     """Return the gathered light and ambient occlusion of the front texels.
 
@@ -126,8 +165,8 @@ def trace_final_gather(
         Light that entries reflect, in a table that gather rays look up.
     analytic : (n,) uint8
         1 for entries whose light from emitters is complete, so that the gather must not add it.
-    run : TileRunner
-        Runs the tiles. Results of tiles that it skips stay 0.
+    runs : PartRunner
+        Returns the runner of the tiles of a part. Results of tiles that it skips stay 0.
 
     Returns
     -------
@@ -135,39 +174,54 @@ def trace_final_gather(
         Light and ambient occlusion of all front texels.
     """
     settings = prepared.settings
-    return final_gather(
-        prepared.job.on(run),
-        prepared.texels.n_front,
-        seen,
-        analytic,
-        prepared.sampling,
-        sky=settings.sky_radiance,
-        ao_distance=settings.ao_reach(prepared.geometry.diagonal),
-    )
+    found = [
+        final_gather(
+            part.job(prepared.job).on(runs(part)),
+            part.n_front,
+            seen,
+            analytic[part.rows],
+            part.sampling(prepared.sampling),
+            sky=settings.sky_radiance,
+            ao_distance=settings.ao_reach(prepared.geometry.diagonal),
+        )
+        for part in prepared.parts
+    ]
+    if len(found) == 1:
+        return found[0]
+    whole = replace(Gathered.zeros(prepared.texels.n_front), rays=sum(one.rays for one in found))
+    for part, one in zip(prepared.parts, found, strict=True):
+        for name in ("indirect", "direct", "open", "variance"):
+            getattr(whole, name)[part.front_rows] = getattr(one, name)
+    return whole
 
 
-def trace_ambient_occlusion(prepared: PreparedScene, run: TileRunner) -> NDArray[np.float32]:
+def trace_ambient_occlusion(prepared: PreparedScene, runs: PartRunner) -> NDArray[np.float32]:
     """Return the ambient occlusion of the front texels, computed with separate rays.
 
     Parameters
     ----------
     prepared : PreparedScene
         The scene and the settings of the bake.
-    run : TileRunner
-        Runs the tiles. Results of tiles that it skips stay 0.
+    runs : PartRunner
+        Returns the runner of the tiles of a part. Results of tiles that it skips stay 0.
 
     Returns
     -------
     (n_front,) float32
         Ambient occlusion from 0, fully occluded, to 1, unoccluded.
     """
-    settings = prepared.settings
-    return ambient_occlusion(
-        prepared.job.on(run),
-        prepared.texels.n_front,
-        n_samples=settings.ao_samples or settings.hemisphere_samples,
-        distance=settings.ao_reach(prepared.geometry.diagonal),
-    )
+    settings, job = prepared.settings, prepared.job
+    if prepared.occluders is not None:
+        job = replace(job, tracer=prepared.occluders.tracer)
+    whole = np.zeros(prepared.texels.n_front, np.float32)
+    for part in prepared.parts:
+        whole[part.front_rows] = ambient_occlusion(
+            part.job(job).on(runs(part)),
+            part.n_front,
+            n_samples=part.rays(settings.ao_samples or settings.hemisphere_samples),
+            distance=settings.ao_reach(prepared.geometry.diagonal),
+        )
+    return whole
 
 
 def _reflected(

@@ -70,6 +70,12 @@ class DirectLight:
     analytic: NDArray[np.uint8]
     rays: int
 
+    @classmethod
+    def zeros(cls, n: int, rays: int) -> DirectLight:
+        """Return zeros for n entries."""
+        weighted, complete = np.zeros((n, 3), np.float32), np.zeros((n, 3), np.float32)
+        return cls(weighted, complete, np.zeros(n, np.float32), np.zeros(n, np.uint8), rays)
+
 
 def direct_light(job: TraceJob, lights: tuple[PunctualLight, ...], sampling: EmitterSampling) -> DirectLight:
     """Compute the direct irradiance of every texel entry.

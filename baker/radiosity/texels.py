@@ -50,7 +50,8 @@ def build_texels(
     Surface
         The same entries as arrays for kernels, which compute ray origins from them.
     """
-    found = _overlaps(geometry, atlas.resolution, atlas.n_pages)
+    n_pages = atlas.n_pages + atlas.n_hidden
+    found = _overlaps(geometry, atlas.resolution, n_pages)
     n_front = len(found.pixel)
     front = np.concatenate([np.arange(n_front), _two_sided(geometry, found)]).astype(np.int32)
     surface = _surface(geometry, atlas, found, front, seed)
@@ -61,7 +62,7 @@ def build_texels(
     main = geometry.instance[found.entry[found.first[:-1]]] if n_front else np.zeros(0, np.int32)
     texels = TexelBuffer(
         resolution=atlas.resolution,
-        n_pages=atlas.n_pages,
+        n_pages=n_pages,
         n_front=n_front,
         pixel=surface.pixel,
         back=back,
@@ -75,7 +76,7 @@ def build_texels(
         position=_with_backs(mean.position, front, back),
         normal=_with_backs(mean.normal, front, back, -1.0),
         albedo=_with_backs(mean.albedo, front, back),
-        lookup=_lookup(found.pixel, atlas.resolution, atlas.n_pages),
+        lookup=_lookup(found.pixel, atlas.resolution, n_pages),
         back_entry=back_entry,
         region=found.chart,
     )

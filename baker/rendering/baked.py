@@ -66,6 +66,8 @@ class BakedLight:
         weight = np.stack([1 - bary.sum(axis=1), bary[:, 0], bary[:, 1]], axis=1)
         uv = np.einsum("nk,nka->na", weight, self.geometry.uv[self.geometry.triangle[triangle]].astype(float))
         irradiance = bilinear(self.bake.maps["irradiance"], self.geometry.page[triangle], uv)
+        receives = np.array([layout.receives for layout in self.bake.atlas.layouts], bool)
+        irradiance[~receives[self.geometry.instance[triangle]]] = 0.0
         light[lit] = hits.albedo[lit] * irradiance / math.pi
         surface = reference.surfaces.row
         emitting = np.flatnonzero(hits.lit & (surface[hits.triangle, SHINES] > 0))

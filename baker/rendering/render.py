@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baker.core.errors import InputError
+from baker.core.object_settings import NEUTRAL
 from baker.core.progress import Progress, report, silent
 from baker.core.read_options import ReadOptions
 from baker.core.result import Result
 from baker.core.scene import Camera, Scene, SceneWarning
 from baker.core.stage import Stage
 from baker.io.load import load_scene
+from baker.io.object_rules import apply_object_settings
 from baker.kernels.not_kept import cache_warnings
 from baker.pathtracer.camera import parse_camera
 from baker.pathtracer.scene import Reference, build_reference
@@ -150,10 +152,9 @@ def render(
         warnings = [*baked.bake.warnings]
         if not isinstance(scene, Scene):
             warnings += other_scene(baked.bake, Path(scene), allow_outside=settings.allow_outside)
-        scene, sky = baked.bake.scene, baked.bake.sky if settings.sky is None else sky
+        scene, sky = _seen(baked.bake.scene), baked.bake.sky if settings.sky is None else sky
     elif not isinstance(scene, Scene):
-        options = ReadOptions.of(settings)
-        scene = load_scene(scene, options=options, reflections=True, allow_outside=settings.allow_outside)
+        scene = _load(scene, settings)
     warnings += [*scene.warnings, *cache_warnings()]
     if text is not None and camera is None:
         camera = named_camera(scene.cameras, text)
@@ -188,6 +189,18 @@ def render(
         camera=run.camera,
         warnings=warnings,
     )
+
+
+def _seen(scene: Scene) -> Scene:
+    """Return a baked scene as the camera sees it: with all objects, whatever their effect on light was."""
+    return replace(scene, instances=tuple(replace(i, settings=NEUTRAL) for i in scene.instances))
+
+
+def _load(path: Path | str, settings: RenderSettings) -> Scene:
+    """Read a scene file, and apply the settings of its objects."""
+    options = ReadOptions.of(settings)
+    scene = load_scene(path, options=options, reflections=True, allow_outside=settings.allow_outside)
+    return apply_object_settings(scene, settings)
 
 
 def _own_camera(scene: Scene, reference: Reference) -> Camera:

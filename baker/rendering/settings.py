@@ -7,6 +7,7 @@ from typing import ClassVar, Literal
 
 from baker.core.errors import SettingsError
 from baker.core.names import unknown_name
+from baker.core.object_settings import ObjectRules
 from baker.core.settings import BakeSettings, ao_metres
 from baker.core.settings_model import Names, Numbers, Settings, Text, same_setting, setting
 
@@ -85,6 +86,10 @@ class RenderSettings(Settings):
     )
     split: Literal["groups", "objects", "none"] = same_setting(BakeSettings, "split")
     unlit: Literal["block", "lit"] = same_setting(BakeSettings, "unlit")
+    include: Names = same_setting(BakeSettings, "include")
+    exclude: Names = same_setting(BakeSettings, "exclude")
+    object: ObjectRules = same_setting(BakeSettings, "object")
+    name_rules: bool = same_setting(BakeSettings, "name_rules")
     allow_outside: bool = same_setting(BakeSettings, "allow_outside")
     seed: int = same_setting(BakeSettings, "seed")
     threads: int | None = same_setting(BakeSettings, "threads")

@@ -38,7 +38,8 @@ def scene_solids(scene: Scene, geometry: Geometry, shading: Shading) -> Solids:
         position=geometry.position,
         triangle=geometry.triangle,
         instance=geometry.instance,
-        opaque=_opaque(geometry, shading),
+        # An object that no ray hits is no solid: points inside it are lit.
+        opaque=_opaque(geometry, shading) & scene.object_flags("cast")[geometry.instance],
         double_sided=geometry.double_sided,
         emits=(shading.emission.max(axis=1) > 0)[geometry.material],
     )

@@ -1,8 +1,9 @@
-"""Computes a lower texel density for objects on which a lightmap is invisible.
+"""Computes the texel density of each object relative to others.
 
-An emitter with a black base colour, such as a sky dome, reflects nothing. A surface of alpha 0 is invisible.
-With the same density as other objects, a sky dome would fill almost the whole page, because its area is much
-larger than the area of the scene inside.
+Objects may have a density, or a factor on the density, among their settings. Objects on which a lightmap is
+invisible have a lower density. An emitter with a black base colour, such as a sky dome, reflects nothing. A
+surface of alpha 0 is invisible. With the same density as other objects, a sky dome would fill almost the
+whole page, because its area is much larger than the area of the scene inside.
 """
 
 from __future__ import annotations
@@ -30,6 +31,39 @@ def density_shares(scene: Scene, instances: list[Instance]) -> NDArray[np.float6
     most = _MOST / (1.0 - _MOST) * float(area[~hidden].sum())
     share[hidden] = min(1.0, float(np.sqrt(most / max(float(area[hidden].sum()), 1e-300))))
     return share
+
+
+def object_shares(
+    scene: Scene, instances: list[Instance], density: float | None
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return the factors on the density of the pages, and which instances have a fixed density.
+
+    Parameters
+    ----------
+    scene : Scene
+        Materials and meshes.
+    instances : list of N Instance
+        The instances, with their settings.
+    density : float or None
+        The setting `density` of the bake, texels per metre. With it, all other instances have this density.
+
+    Returns
+    -------
+    share : (N,) float64
+        Factor on the density of each instance; for fixed instances, their density in texels per metre.
+    fixed : (N,) bool
+        Whether an instance has an absolute density. With the setting `density`, it is expressed as a factor.
+    """
+    share = density_shares(scene, instances) if density is None else np.ones(len(instances))
+    fixed = np.zeros(len(instances), bool)
+    for k, instance in enumerate(instances):
+        absolute = instance.settings.texels_per_metre
+        if absolute is None:
+            share[k] *= instance.settings.density_factor
+        else:
+            share[k] = absolute / (density or 1.0)
+            fixed[k] = density is None
+    return share, fixed
 
 
 def _shows_nothing(material: Material) -> bool:

@@ -90,7 +90,7 @@ def choose_kept(scene: Scene, resolution: int, mode: str) -> KeptUv:
     resolution : int
         Page width in texels.
     mode : str
-        The setting `uv`: "auto", "keep" or "unwrap".
+        The setting `uv`: "auto", "keep" or "unwrap". An object's setting `uv` overrides it.
 
     Returns
     -------
@@ -105,18 +105,20 @@ def choose_kept(scene: Scene, resolution: int, mode: str) -> KeptUv:
     n = len(scene.instances)
     usable = np.zeros(n, bool)
     warnings: list[SceneWarning] = []
-    if mode == "unwrap":
-        return KeptUv(usable, False, ())
-    fault = {m: find_fault(scene.meshes[m], resolution) for m in sorted({i.mesh for i in scene.instances})}
+    modes = [instance.settings.uv or mode for instance in scene.instances]
+    tested = {i.mesh for i, own in zip(scene.instances, modes, strict=True) if own != "unwrap"}
+    fault = {m: find_fault(scene.meshes[m], resolution) for m in sorted(tested)}
     warned: set[int] = set()
-    for k, instance in enumerate(scene.instances):
+    for k, (instance, own) in enumerate(zip(scene.instances, modes, strict=True)):
+        if own == "unwrap":
+            continue
         found = fault[instance.mesh]
         usable[k] = found is None
         if found is None:
             continue
         code, why = found
         name = instance.name or scene.meshes[instance.mesh].name
-        if mode == "keep":
+        if own == "keep":
             raise InputError(
                 f"the lightmap uv cannot be kept, because {why}; repair it or use `uv='auto'`"
                 " or `uv='unwrap'`",
@@ -126,7 +128,9 @@ def choose_kept(scene: Scene, resolution: int, mode: str) -> KeptUv:
         if code != "uv.missing" and instance.mesh not in warned:
             warned.add(instance.mesh)
             warnings.append(SceneWarning(code, f"'{name}' is unwrapped, because {why}", name))
-    together = bool(n) and bool(usable.all()) and _disjoint(scene, resolution)
+    # An object's density changes the size of its layout, so the layouts of all objects are packed again.
+    resized = any(instance.settings.resized for instance in scene.instances)
+    together = bool(n) and bool(usable.all()) and not resized and _disjoint(scene, resolution)
     return KeptUv(usable, together, tuple(warnings))
 
 

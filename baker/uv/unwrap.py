@@ -16,9 +16,17 @@ from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
 from baker.uv.charts import MeshCharts, chart_meshes
 from baker.uv.check import PAGE_TOLERANCE, page_overlap, uv_area
-from baker.uv.density_share import density_shares
-from baker.uv.keep import choose_kept, close_charts, kept_charts, lightmap_uv
+from baker.uv.density_share import object_shares
+from baker.uv.keep import KeptUv, choose_kept, close_charts, kept_charts, lightmap_uv
 from baker.uv.outlines import CutInstance, RigidInstance, make_outlines, place_uv
+from baker.uv.page_groups import (
+    hidden_density,
+    join_atlases,
+    page_groups,
+    part_of_progress,
+    settings_of_group,
+)
+from baker.uv.page_packer import DensityLimits
 from baker.uv.pages import fill_pages
 
 # Limit of the relative difference between the scales of an instance along different axes. Up to this limit,
@@ -65,15 +73,41 @@ def unwrap_scene(scene: Scene, settings: BakeSettings, progress: Progress = sile
     Cancelled
         If `progress` returned a truthy value.
     """
+    file = str(scene.path) if scene.path else None
     if scene.n_triangles == 0:
-        raise InputError("the scene has no triangles to bake", file=str(scene.path) if scene.path else None)
+        raise InputError("the scene has no triangles to bake", file=file)
+    groups = page_groups(scene)
+    if groups[0].hidden:
+        raise InputError("no object is left that gets texels: all have receive=false", file=file)
+    atlases: list[Atlas] = []
+    for number, group in enumerate(groups):
+        part = replace(scene, instances=tuple(scene.instances[k] for k in group.members))
+        part_progress = part_of_progress(progress, number, len(groups))
+        if group.hidden:
+            hidden = settings.changed(density=None, budget=None, max_pages=max(settings.max_pages, 16))
+            atlases.append(_unwrap_group(part, hidden, part_progress, most=hidden_density(atlases)))
+            continue
+        n_later = sum(not later.hidden for later in groups[number + 1 :])
+        own = settings_of_group(settings, sum(atlas.n_pages for atlas in atlases), n_later)
+        reserved = settings.max_pages - own.max_pages
+        atlases.append(_unwrap_group(part, own, part_progress, reserved=reserved))
+    return join_atlases(scene, groups, atlases)
+
+
+def _unwrap_group(
+    scene: Scene, settings: BakeSettings, progress: Progress, *, most: float = np.inf, reserved: int = 0
+) -> Atlas:
+    """Lay out the instances of one group in pages of their own.
+
+    most : upper limit of the density, texels per metre; reserved : see `DensityLimits`
+    """
     report(progress, Stage.UNWRAP, 0.0)
     kept = choose_kept(scene, settings.resolution, settings.uv)
-    if kept.together:
+    if kept.together and most == np.inf:
         atlas = _keep_all(scene, settings, kept.warnings)
     else:
         try:
-            atlas = _lay_out(scene, settings, progress, kept.usable, kept.warnings)
+            atlas = _lay_out(scene, settings, progress, kept, (most, reserved))
         except InputError as error:
             # Add the path of the scene, which the packer cannot name.
             raise InputError(
@@ -118,24 +152,23 @@ def _lay_out(
     scene: Scene,
     settings: BakeSettings,
     progress: Progress,
-    usable: NDArray[np.bool_],
-    warnings: tuple[SceneWarning, ...],
+    kept: KeptUv,
+    bounds: tuple[float, int],
 ) -> Atlas:
     """Cut the instances whose TEXCOORD_1 is not usable, and pack all instances.
 
-    usable : (I,) bool, see `KeptUv`
+    bounds : `most` and `reserved` of `DensityLimits`
     """
     # Leave out instances without triangles.
     filled = [k for k, i in enumerate(scene.instances) if len(scene.meshes[i.mesh].triangle)]
-    # With the setting `density`, all instances have this density.
-    equal = settings.density is not None
-    shares = np.ones(len(filled)) if equal else density_shares(scene, [scene.instances[k] for k in filled])
-    placements, cuts = _placements(scene, filled, shares, usable)
-    found = list(warnings)
+    shares, fixed = object_shares(scene, [scene.instances[k] for k in filled], settings.density)
+    placements, cuts = _placements(scene, filled, shares, kept.usable)
+    found = list(kept.warnings)
     charts = _cut(scene, cuts, settings, progress, found)
     outlines = make_outlines(placements, charts)
     names = [scene.instances[k].name or scene.meshes[scene.instances[k].mesh].name for k in filled]
-    pages, packing_warnings = fill_pages(outlines, names, settings, progress)
+    limits = DensityLimits(fixed, *bounds)
+    pages, packing_warnings = fill_pages(outlines, names, settings, progress, limits)
     found += packing_warnings
     layouts: list[InstanceLayout] = [
         InstanceLayout(

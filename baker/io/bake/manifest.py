@@ -17,10 +17,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from baker.core.atlas import InstanceLayout
 from baker.core.light_kind import kind_of
 from baker.core.lightmap import BakeResult, Lightmap
 from baker.core.printable import json_text
-from baker.core.scene import SceneWarning
+from baker.core.scene import Instance, SceneWarning
 from baker.core.version import VERSION as BAKER_VERSION
 
 if TYPE_CHECKING:
@@ -82,6 +83,7 @@ def make_manifest(
         "channels": {name: _channel(lightmap) for name, lightmap in result.lightmaps.items()},
         "pages": pages,
         "instances": _instances(result, instance_mesh),
+        "objects": _objects(result),
         "lights": _lights(result),
         "timings": result.timings,
         "rays": result.rays,
@@ -202,10 +204,37 @@ def _instances(result: BakeResult, instance_mesh: tuple[int, ...]) -> list[dict[
             "uv_scale": [1.0, 1.0],
             "texels": texels,
             "density": layout.texels_per_metre,
+            **_density_loss(result, instance, layout),
             "uv": "kept" if layout.kept else "unwrapped",
         }
         for instance, layout, mesh, texels in rows
+        if instance.settings.receive
     ]
+
+
+def _density_loss(result: BakeResult, instance: Instance, layout: InstanceLayout) -> dict[str, float]:
+    """Return the lost share of the density that was asked for, 0 to 1, if a density was asked for."""
+    asked = instance.settings.texels_per_metre
+    if asked is None and result.settings.density is not None:
+        asked = result.settings.density * instance.settings.density_factor
+    if asked is None or result.settings.budget is None:
+        return {}
+    return {"density_loss": round(max(0.0, 1.0 - layout.texels_per_metre / asked), 6)}
+
+
+def _objects(result: BakeResult) -> list[dict[str, Any]]:
+    """Return the settings of all objects that have any, and where they come from, ordered by node."""
+    rows = [
+        {
+            "node": i.node,
+            "name": i.name,
+            "settings": given,
+            "reasons": {key: i.reasons[key] for key in given if key in i.reasons},
+        }
+        for i in (*result.scene.instances, *result.scene.left_out)
+        if (given := i.settings.given())
+    ]
+    return sorted(rows, key=lambda row: row["node"])
 
 
 def _lights(result: BakeResult) -> list[dict[str, Any]]:
@@ -222,7 +251,8 @@ def _lights(result: BakeResult) -> list[dict[str, Any]]:
     for index in sorted(used):
         material = result.scene.materials[index]
         if any(material.emission):
-            entry = {"kind": "emissive", "name": material.name, "material": index}
+            number = index if material.original is None else material.original
+            entry = {"kind": "emissive", "name": material.name, "material": number}
             lights.append({**entry, "radiance": material.emission, "unit": "cd/m2"})
     if any(result.settings.sky_radiance):
         sky = {"kind": "sky", "name": "sky", "radiance": result.settings.sky_radiance, "unit": "cd/m2"}

@@ -7,7 +7,7 @@ arrays in memory.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +18,12 @@ from baker.core.atlas import Atlas, InstanceLayout
 from baker.core.encoding import encoding_of
 from baker.core.errors import InputError, SettingsError
 from baker.core.read_options import ReadOptions
-from baker.core.scene import Scene, SceneWarning
+from baker.core.scene import Mesh, Scene, SceneWarning
 from baker.core.settings import make_settings
 from baker.io.bake.output_folder import AS_BAKED, MANIFEST_NAME, file_state, is_file
 from baker.io.bake.read_manifest import read_manifest
-from baker.io.choose import choose_objects
 from baker.io.load import load_scene
+from baker.io.object_rules import apply_recorded
 from baker.io.png import decode_palette_png
 
 SCENE_NAME = "scene.glb"
@@ -43,7 +43,8 @@ class StoredBake:
         The objects of `scene.glb` that were baked; the sky is in `manifest["settings"]`.
     atlas : Atlas
         The lightmap uv are `TEXCOORD_1 x uv_scale + uv_offset`. Page numbers are from the manifest. All
-        triangles of an instance form one chart, whose number is the index of the instance.
+        triangles of an instance form one chart, whose number is the index of the instance. The uv of
+        instances without texels are 0.
     maps : dict of str to (P, H, W, C) float32
         For each channel, P pages of H x W texels with C components.
     status : (P, H, W) uint8, `baker.core.lightmap.TexelStatus`
@@ -65,6 +66,16 @@ class StoredBake:
         baked = self.manifest.get("settings", {})
         known = {key: baked[key] for key in ("sky", "sky_strength") if baked.get(key) is not None}
         return make_settings(known).sky_radiance
+
+    def with_texels(self) -> StoredBake:
+        """Return the bake without the instances that have no texels."""
+        lit = [k for k, layout in enumerate(self.atlas.layouts) if layout.receives]
+        if len(lit) == len(self.atlas.layouts):
+            return self
+        instances = tuple(self.scene.instances[k] for k in lit)
+        layouts = tuple(replace(self.atlas.layouts[k], instance=n) for n, k in enumerate(lit))
+        scene, atlas = replace(self.scene, instances=instances), replace(self.atlas, layouts=layouts)
+        return replace(self, scene=scene, atlas=atlas)
 
 
 def read_bake(folder: Path | str) -> StoredBake:
@@ -93,7 +104,10 @@ def read_bake(folder: Path | str) -> StoredBake:
     warnings = tuple(_changed(folder, entry) for entry in manifest["files"] if _differs(folder, entry))
     settings = manifest["settings"]
     scene = _scene(folder, settings)
-    scene = choose_objects(scene, settings.get("include", ()), settings.get("exclude", ()))
+    try:
+        scene = apply_recorded(scene, manifest)
+    except SettingsError as error:
+        raise _damaged(folder, error) from None
     pages, rows = manifest["pages"], {row["node"]: row for row in manifest["instances"]}
     maps = {name: _pages(folder, manifest, name) for name in dict.fromkeys(p["channel"] for p in pages)}
     resolution, n_pages = pages[0]["width"], 1 + max(page["page"] for page in pages)
@@ -183,6 +197,8 @@ def _layout(folder: Path, scene: Scene, index: int, row: dict[str, Any] | None) 
     instance = scene.instances[index]
     mesh = scene.meshes[instance.mesh]
     uv = mesh.texcoord[1] if len(mesh.texcoord) > 1 else None
+    if not instance.settings.receive:
+        return _without_texels(index, mesh)
     if row is None or uv is None:
         message = "the object has no lightmap uv or is not in the manifest; bake the scene again"
         raise InputError(message, file=str(folder / SCENE_NAME), object=instance.name)
@@ -196,6 +212,22 @@ def _layout(folder: Path, scene: Scene, index: int, row: dict[str, Any] | None) 
         chart=np.full(len(mesh.triangle), index, np.int32),
         kept=row.get("uv") == "kept",
         texels_per_metre=float(row["density"]),
+    )
+
+
+def _without_texels(index: int, mesh: Mesh) -> InstanceLayout:
+    """Return the layout of an instance that has no texels: its lightmap uv have no area."""
+    n = len(mesh.position)
+    return InstanceLayout(
+        instance=index,
+        page=0,
+        vertex=np.arange(n, dtype=np.int32),
+        uv=np.zeros((n, 2), np.float32),
+        triangle=mesh.triangle,
+        chart=np.full(len(mesh.triangle), index, np.int32),
+        kept=False,
+        texels_per_metre=0.0,
+        receives=False,
     )
 
 

@@ -50,18 +50,29 @@ def new_document(scene: Scene, atlas: Atlas) -> tuple[Packer, list[BakedUse], li
     packer = Packer(document)
     extensions: set[str] = set()
     images: dict[int, int] = {}
-    if scene.materials:
-        document["materials"] = [material_json(packer, m, images, extensions) for m in scene.materials]
-    order = sorted(range(len(scene.instances)), key=lambda i: (scene.instances[i].node, i))
+    written = [m for m in scene.materials if m.original is None]
+    if written:
+        document["materials"] = [material_json(packer, m, images, extensions) for m in written]
+    everything = [*scene.instances, *scene.left_out]
+    order = sorted(range(len(everything)), key=lambda i: (everything[i].node, i))
     uses: list[BakedUse] = []
     instance_mesh = [0] * len(order)
     nodes, meshes = document.setdefault("nodes", []), document.setdefault("meshes", [])
     for index in order:
-        instance, layout = scene.instances[index], atlas.layouts[index]
-        mesh = scene.meshes[instance.mesh]
+        instance = everything[index]
+        layout = atlas.layouts[index] if index < len(atlas.layouts) else None
+        mesh = _with_original_materials(scene, scene.meshes[instance.mesh])
         node, shown = _node(instance, mesh)
-        primitives = _primitives(packer, shown, layout, mirrored=shown is not mesh and _mirrors(instance))
-        uses += [BakedUse(primitive, layout.page) for primitive in primitives]
+        mirrored = shown is not mesh and _mirrors(instance)
+        if layout is None or not layout.receives:
+            primitives = _primitives(packer, shown, _plain_layout(shown), mirrored=mirrored)
+            for primitive in primitives:
+                unused = primitive["attributes"].pop("TEXCOORD_1")
+                if primitive["attributes"]["TEXCOORD_0"] == unused:
+                    del primitive["attributes"]["TEXCOORD_0"]
+        else:
+            primitives = _primitives(packer, shown, layout, mirrored=mirrored)
+            uses += [BakedUse(primitive, layout.page) for primitive in primitives]
         instance_mesh[index] = len(meshes)
         nodes.append({**node, "mesh": len(meshes)})
         meshes.append({"name": mesh.name, "primitives": primitives})
@@ -83,7 +94,23 @@ def new_document(scene: Scene, atlas: Atlas) -> tuple[Packer, list[BakedUse], li
     document["scene"] = 0
     if extensions:
         document["extensionsUsed"] = sorted(extensions)
-    return packer, uses, instance_mesh
+    return packer, uses, instance_mesh[: len(scene.instances)]
+
+
+def _with_original_materials(scene: Scene, mesh: Mesh) -> Mesh:
+    """Return the mesh with the materials of the file in place of copies that settings of objects change."""
+    number = [k if m.original is None else m.original for k, m in enumerate(scene.materials)]
+    if number == list(range(len(number))):
+        return mesh
+    return replace(mesh, material=np.array(number, np.int32)[mesh.material])
+
+
+def _plain_layout(mesh: Mesh) -> InstanceLayout:
+    """Return the layout of a mesh without lightmap uv."""
+    n, n_triangles = len(mesh.position), len(mesh.triangle)
+    vertex, chart = np.arange(n, dtype=np.int32), np.zeros(n_triangles, np.int32)
+    uv = np.zeros((n, 2), np.float32)
+    return InstanceLayout(0, 0, vertex, uv, mesh.triangle, chart, False, 0.0, receives=False)
 
 
 def scene_name(scene: Scene) -> Json:

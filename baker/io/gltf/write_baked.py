@@ -111,10 +111,12 @@ def _rewrite(
 ) -> tuple[Packer, list[BakedUse], list[int]]:
     """Return a copy of the source document with lightmap uv, its baked primitives and the instance meshes."""
     document = copy.deepcopy(source.json)
-    instance_mesh = _own_meshes(document, source.json, scene.instances)
+    lit = {k for k, layout in enumerate(atlas.layouts) if layout.receives}
+    instance_mesh = _own_meshes(document, source.json, scene.instances, lit)
     pieces = [
         piece
         for instance, layout, mesh_index in zip(scene.instances, atlas.layouts, instance_mesh, strict=True)
+        if layout.receives
         for piece in _split(
             scene.meshes[instance.mesh],
             layout,
@@ -139,26 +141,29 @@ def _rewrite(
     return packer, uses, instance_mesh
 
 
-def _own_meshes(document: Json, source: Json, instances: tuple[Instance, ...]) -> list[int]:
-    """Assign a separate mesh to every baked node, and return the mesh index of each instance.
+def _own_meshes(document: Json, source: Json, instances: tuple[Instance, ...], lit: set[int]) -> list[int]:
+    """Assign a separate mesh to every node with a lightmap, and return the mesh index of each instance.
+
+    lit : indices of the instances with a lightmap
 
     The first instance of a mesh keeps the mesh's index; for the other instances, copies of the mesh are
-    appended. If a node that is not baked (for example in another scene) uses the mesh, all baked instances
-    get copies.
+    appended. If a node without a lightmap (for example in another scene) uses the mesh, all instances with a
+    lightmap get copies.
     """
-    baked = {instance.node for instance in instances}
-    if len(baked) < len(instances):
+    baked = {instance.node for k, instance in enumerate(instances) if k in lit}
+    if len({instance.node for instance in instances}) < len(instances):
         raise InputError("a node stands for several instances; baking them apart is not possible")
     taken = {
         node["mesh"] for i, node in objects(source, "nodes") if i not in baked and is_index(node.get("mesh"))
     }
     result = []
-    for instance in instances:
+    for k, instance in enumerate(instances):
         mesh = source["nodes"][instance.node]["mesh"]
-        if mesh in taken:
+        if k in lit and mesh in taken:
             document["meshes"].append(copy.deepcopy(source["meshes"][mesh]))
             document["nodes"][instance.node]["mesh"] = len(document["meshes"]) - 1
-        taken.add(mesh)
+        if k in lit:
+            taken.add(mesh)
         result.append(document["nodes"][instance.node]["mesh"])
     return result
 
