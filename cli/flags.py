@@ -7,15 +7,19 @@ In messages of the library, settings and arguments are between backticks and hav
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from functools import cache
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from baker.core.printable import printable_lines
+
+if TYPE_CHECKING:
+    from baker.core.settings_model import Settings
 
 _NAMED = re.compile(r"`([a-z][a-z0-9_]*)(?:=([^`\s]+))?`")
 # Arguments of subcommands that have a flag but are not settings.
 _ARGUMENTS = frozenset({
-    "cluster", "config", "fix", "force", "junit", "out", "port", "report", "sarif", "three",
+    "cluster", "config", "fix", "force", "junit", "objects", "out", "port", "report", "sarif", "three",
 })  # fmt: skip
 # Arguments whose flag is not `--` followed by their name.
 _SHORT = {"out": "-o"}
@@ -41,27 +45,46 @@ def dashed(name: str) -> str:
     return _RENAMED.get(name, name).replace("_", "-")
 
 
+def _models() -> Iterator[type[Settings]]:
+    """Yield the settings of each command; a command's module is imported when its turn comes."""
+    from baker.core.settings import BakeSettings
+
+    yield BakeSettings
+    from baker.checks.settings import CheckSettings
+
+    yield CheckSettings
+    from baker.rendering.settings import RenderSettings
+
+    yield RenderSettings
+    from baker.verification.settings import VerifySettings
+
+    yield VerifySettings
+    from baker.comparison.settings import DiffSettings
+
+    yield DiffSettings
+    from baker.repairs.settings import RepairSettings
+
+    yield RepairSettings
+    from baker.jobs.settings import BatchSettings
+
+    yield BatchSettings
+
+
 @cache
-def flag_names() -> frozenset[str]:
-    """Return the names of all settings and arguments that have a flag.
+def has_flag(name: str) -> bool:
+    """Return whether a setting or an argument has a flag.
+
+    Parameters
+    ----------
+    name : str
+        Its name, with underscores.
 
     Returns
     -------
-    frozenset of str
-        The names, with underscores.
+    bool
+        True if any command has the flag.
     """
-    from baker.checks.settings import CheckSettings
-    from baker.comparison.settings import DiffSettings
-    from baker.core.settings import BakeSettings
-    from baker.core.settings_model import Settings
-    from baker.jobs.settings import BatchSettings
-    from baker.rendering.settings import RenderSettings
-    from baker.repairs.settings import RepairSettings
-    from baker.verification.settings import VerifySettings
-
-    models: list[type[Settings]] = [BakeSettings, BatchSettings, CheckSettings, DiffSettings]
-    models += [RenderSettings, RepairSettings, VerifySettings]
-    return _ARGUMENTS.union(*(model.model_fields for model in models))
+    return name in _ARGUMENTS or any(name in model.model_fields for model in _models())
 
 
 def in_flags(text: str, quote: str = "") -> str:
@@ -150,7 +173,7 @@ class FlagStream:
 
 
 def _is_named(found: re.Match[str]) -> bool:
-    return found[1] in flag_names() and (found[1] != _AMBIGUOUS or found[2] is not None)
+    return has_flag(found[1]) and (found[1] != _AMBIGUOUS or found[2] is not None)
 
 
 def _flag(name: str, value: str | None) -> str:

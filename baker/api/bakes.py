@@ -112,7 +112,7 @@ def bake(
             Time of the animation that poses a glTF scene; default: the pose of the file, with `animation`
             0.
         missing_textures : Literal["error", "white", "grey", "magenta"], default 'error'
-            Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.
+            Colour that replaces unreadable textures of base colour, emission and alpha, or error.
         split : Literal["groups", "objects", "none"], default 'groups'
             What becomes an object of an OBJ file: each object and group, each object, or the whole file.
         unlit : Literal["block", "lit"], default 'block'

@@ -105,7 +105,7 @@ class BakeKeywords(TypedDict, total=False):
     # 0.
     time: float | None
 
-    # Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.
+    # Colour that replaces unreadable textures of base colour, emission and alpha, or error.
     missing_textures: Literal["error", "white", "grey", "magenta"]
 
     # What becomes an object of an OBJ file: each object and group, each object, or the whole file.
@@ -262,7 +262,7 @@ class LoadKeywords(TypedDict, total=False):
     # 0.
     time: float | None
 
-    # Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.
+    # Colour that replaces unreadable textures of base colour, emission and alpha, or error.
     missing_textures: Literal["error", "white", "grey", "magenta"]
 
     # What becomes an object of an OBJ file: each object and group, each object, or the whole file.
@@ -337,7 +337,7 @@ class RenderKeywords(TypedDict, total=False):
     # 0.
     time: float | None
 
-    # Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.
+    # Colour that replaces unreadable textures of base colour, emission and alpha, or error.
     missing_textures: Literal["error", "white", "grey", "magenta"]
 
     # What becomes an object of an OBJ file: each object and group, each object, or the whole file.

@@ -161,7 +161,7 @@ class CommonSettings(Settings):
     )
     missing_textures: Literal["error", "white", "grey", "magenta"] = setting(
         "error",
-        "Colour that replaces unreadable textures of base colour, emission and alpha, or `error`.",
+        "Colour that replaces unreadable textures of base colour, emission and alpha, or error.",
         group=SCENE,
     )
     split: Literal["groups", "objects", "none"] = setting(

@@ -186,7 +186,9 @@ def _scene(path: Path, scene: Scene) -> dict[str, Any]:
     for instance in scene.instances:
         matrix = instance.world_from_object
         mesh = scene.meshes[instance.mesh]
-        used = mesh.position[np.unique(mesh.triangle)].astype(np.float64)
+        is_used = np.zeros(len(mesh.position), dtype=bool)
+        is_used[mesh.triangle] = True
+        used = mesh.position[is_used].astype(np.float64)
         world = used @ matrix[:3, :3].T + matrix[:3, 3]
         low, high = np.minimum(low, world.min(axis=0)), np.maximum(high, world.max(axis=0))
     return {

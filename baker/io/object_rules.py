@@ -212,7 +212,8 @@ def apply_object_settings(scene: Scene, settings: ObjectChoice) -> Scene:
     kept = [i for i in instances if not i.settings.exclude]
     if scene.instances and not kept:
         reason = next(iter(i.reasons["exclude"] for i in instances))
-        message = f"no object is left to bake, because {reason}; look at `baker inspect --objects`"
+        advice = "`baker inspect` with `objects` lists the reasons"
+        message = f"no object is left to bake, because {reason}; {advice}"
         raise InputError(message, file=str(scene.path) if scene.path else None)
     left = replace(scene, lights=lights, source_scene=source, warnings=(*scene.warnings, *warnings))
     return with_object_materials(choose_instances(left, instances))
