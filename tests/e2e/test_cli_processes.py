@@ -33,7 +33,7 @@ def test_help_is_quick_and_imports_nothing_heavy():
 def test_json_stdout_is_kept_clean_of_what_libraries_print():
     code = (
         "import os, sys, types\n"
-        "def look(path, **_):\n    os.write(1, b'library noise')\n    return {'kind': 'x'}\n"
+        "def look(path, own):\n    os.write(1, b'library noise')\n    return {'kind': 'x'}\n"
         "sys.modules['baker.io.inspect'] = types.SimpleNamespace(inspect_path=look)\n"
         "from baker.cli.app import main\nmain()\n"
     )

@@ -27,7 +27,7 @@ def alpha_material(
         texture = Texture(rgba, wrap=(wrap, wrap))
     builder.materials[number] = replace(
         builder.materials[number],
-        base_colour=(albedo, albedo, albedo, alpha),
+        base_colour=(*np.broadcast_to(albedo, 3).tolist(), alpha),
         base_colour_texture=texture,
         alpha_mode=mode,
         alpha_cutoff=cutoff,
