@@ -63,6 +63,8 @@ def bake(
             Empty texels between charts.
         uv : Literal["auto", "keep", "unwrap"], default 'auto'
             Keep TEXCOORD_1 as lightmap uv, or unwrap; `auto` keeps it if it is valid.
+        instances : Literal["share", "unique"], default 'share'
+            Instances of a mesh share one mesh and TEXCOORD_1 in scene.glb, or each has its own copy.
         unwrapper : Literal["xatlas"], default 'xatlas'
             Library that cuts surfaces into charts and packs them.
         quality : Literal["preview", "medium", "high", "ultra"], default 'medium'

@@ -35,6 +35,9 @@ class BakeKeywords(TypedDict, total=False):
     # Keep TEXCOORD_1 as lightmap uv, or unwrap; `auto` keeps it if it is valid.
     uv: Literal["auto", "keep", "unwrap"]
 
+    # Instances of a mesh share one mesh and TEXCOORD_1 in scene.glb, or each has its own copy.
+    instances: Literal["share", "unique"]
+
     # Library that cuts surfaces into charts and packs them.
     unwrapper: Literal["xatlas"]
 
@@ -142,6 +145,7 @@ class AoKeywords(TypedDict, total=False):
     budget: str | None
     padding: int
     uv: Literal["auto", "keep", "unwrap"]
+    instances: Literal["share", "unique"]
     unwrapper: Literal["xatlas"]
     quality: Literal["preview", "medium", "high", "ultra"]
     samples: int | None
@@ -409,6 +413,9 @@ class UnwrapKeywords(TypedDict, total=False):
 
     # Keep TEXCOORD_1 as lightmap uv, or unwrap; `auto` keeps it if it is valid.
     uv: Literal["auto", "keep", "unwrap"]
+
+    # Instances of a mesh share one mesh and TEXCOORD_1 in scene.glb, or each has its own copy.
+    instances: Literal["share", "unique"]
 
     # Library that cuts surfaces into charts and packs them.
     unwrapper: Literal["xatlas"]

@@ -261,6 +261,8 @@ def unwrap(
             Empty texels between charts.
         uv : Literal["auto", "keep", "unwrap"], default 'auto'
             Keep TEXCOORD_1 as lightmap uv, or unwrap; `auto` keeps it if it is valid.
+        instances : Literal["share", "unique"], default 'share'
+            Instances of a mesh share one mesh and TEXCOORD_1 in scene.glb, or each has its own copy.
         unwrapper : Literal["xatlas"], default 'xatlas'
             Library that cuts surfaces into charts and packs them.
         threads : int | None, 1 to 1024, default None

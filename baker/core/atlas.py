@@ -5,6 +5,7 @@ A chart is a piece of surface that is connected in uv. A page is one image of th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,26 @@ from numpy.typing import NDArray
 
 from baker.core.result import Result
 from baker.core.scene import SceneWarning
+
+
+@dataclass(frozen=True, eq=False)
+class SharedUv:
+    """The TEXCOORD_1 that instances of a mesh share, and its place in the page of one of these instances.
+
+    Attributes
+    ----------
+    number : int
+        Instances with the same number share the mesh, with its TEXCOORD_1, in `scene.glb`.
+    uv : (V', 2) float32
+        TEXCOORD_1 of each lightmap vertex.
+    scale, offset : (float, float)
+        Page uv = `uv` x `scale` + `offset`, see `page_uv`.
+    """
+
+    number: int
+    uv: NDArray[np.float32]
+    scale: tuple[float, float]
+    offset: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +63,8 @@ class InstanceLayout:
         Mean number of texels along one metre of surface.
     receives : bool
         Whether the instance has texels in the lightmap. Otherwise its page is hidden, see `Atlas.n_hidden`.
+    shared : SharedUv or None
+        The TEXCOORD_1 that the instance shares with others; None if `uv` is its TEXCOORD_1.
     """
 
     instance: int
@@ -53,6 +76,33 @@ class InstanceLayout:
     kept: bool
     texels_per_metre: float
     receives: bool = True
+    shared: SharedUv | None = None
+
+    @property
+    def texcoord_1(self) -> NDArray[np.float32]:
+        """Return the TEXCOORD_1 (V', 2) of the lightmap vertices in `scene.glb`."""
+        return self.uv if self.shared is None else self.shared.uv
+
+
+def page_uv(uv: NDArray[np.float32], scale: Sequence[float], offset: Sequence[float]) -> NDArray[np.float32]:
+    """Return the uv in a page of a TEXCOORD_1.
+
+    Unwrapping and the reader of `scene.glb` both call this function, so they get the same bits.
+
+    Parameters
+    ----------
+    uv : (V, 2) float32
+        TEXCOORD_1.
+    scale, offset : sequence of two float
+        Place in the page.
+
+    Returns
+    -------
+    (V, 2) float32
+        `uv` x `scale` + `offset`.
+    """
+    placed = uv.astype(np.float64) * np.asarray(scale, np.float64) + np.asarray(offset, np.float64)
+    return placed.astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

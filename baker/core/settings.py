@@ -63,6 +63,11 @@ class CommonSettings(Settings):
     uv: Literal["auto", "keep", "unwrap"] = setting(
         "auto", "Keep TEXCOORD_1 as lightmap uv, or unwrap; `auto` keeps it if it is valid.", group=PAGES
     )
+    instances: Literal["share", "unique"] = setting(
+        "share",
+        "Instances of a mesh share one mesh and TEXCOORD_1 in scene.glb, or each has its own copy.",
+        group=PAGES,
+    )
     unwrapper: Literal["xatlas"] = setting(
         "xatlas", "Library that cuts surfaces into charts and packs them.", group=PAGES
     )

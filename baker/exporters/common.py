@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import os
 import re
 import shutil
 import struct
+from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -85,11 +87,21 @@ def link_file(source: Path, target: Path) -> None:
         shutil.copy2(source, target)
 
 
-def place_scene(bake: Path, target: Path) -> None:
-    """Put `scene.glb` of a bake into `target`, with lights that every loader knows."""
+def place_scene(bake: Path, target: Path, edit: Callable[[dict[str, Any]], bool] | None = None) -> None:
+    """Put `scene.glb` of a bake into `target`, with lights that every loader knows.
+
+    Parameters
+    ----------
+    bake : Path
+        Folder of the bake.
+    target : Path
+    edit : callable or None
+        Called with the document, which it may change; returns whether it has.
+    """
     with (bake / SCENE_NAME).open("rb") as file:
         document = _read_document(file)
-        changed = _glb(document, file.read()) if _replace_lights(document) else None
+        edited = edit is not None and edit(document)
+        changed = _glb(document, file.read()) if _replace_lights(document) or edited else None
     if changed is None:
         link_file(bake / SCENE_NAME, target / SCENE_NAME)
     else:
@@ -198,7 +210,7 @@ def named_scene(bake: Path) -> tuple[dict[str, Any], dict[str, Any], bytes]:
     """Read scene.glb with a unique name for each node, for engines that identify nodes by name.
 
     The name of node i is its old name, with characters that engines interpret replaced by `_`, followed by
-    `_n<i>`. The mesh of a baked node gets the same name, and `extras.baker_node` is i.
+    `_n<i>`. The mesh of a baked node gets the name of its first node, and `extras.baker_node` is i.
 
     Parameters
     ----------
@@ -226,12 +238,41 @@ def named_scene(bake: Path) -> tuple[dict[str, Any], dict[str, Any], bytes]:
             # The plugin for Bevy finds the last member in the text of the extras, without a JSON parser.
             extras.pop("baker_node", None)
             extras["baker_node"] = index
+    first: dict[int, str] = {}
     for entry in description["objects"]:
         node = nodes[entry["node"]]
         entry["name"] = node["name"]
         if "mesh" in node:
-            document["meshes"][node["mesh"]]["name"] = node["name"]
+            name = first.setdefault(node["mesh"], node["name"])
+            document["meshes"][node["mesh"]]["name"] = name
     return document, description, binary
+
+
+def separate_meshes(document: dict[str, Any], manifest: dict[str, Any]) -> dict[int, int]:
+    """Give each baked node a mesh of its own, which refers to the same accessors as the shared one.
+
+    Parameters
+    ----------
+    document : dict
+        Document of scene.glb; `meshes` and `nodes` are changed in place.
+    manifest : dict
+        Content of bake.json.
+
+    Returns
+    -------
+    dict of int to int
+        Index of the mesh of each baked node.
+    """
+    result: dict[int, int] = {}
+    taken: set[int] = set()
+    for entry in manifest["instances"]:
+        node, mesh = entry["node"], entry["mesh"]
+        if mesh in taken:
+            document["meshes"].append(copy.deepcopy(document["meshes"][mesh]))
+            mesh = document["nodes"][node]["mesh"] = len(document["meshes"]) - 1
+        taken.add(mesh)
+        result[node] = mesh
+    return result
 
 
 def write_scene(target: Path, document: dict[str, Any], binary: bytes) -> None:

@@ -5,7 +5,8 @@ cd/m2. `intensity` is such that 99 % of the lit texels are at most 1. The textur
 HDR, by the extension MOZ_texture_rgbe, and for loaders without it an 8-bit linear PNG, in which the brightest
 1 % are white. All pictures are in the file, because Hubs loads single files.
 
-The uv of a lookup is TEXCOORD_1 without a transform: each object of a bake has a mesh of its own.
+Hubs ignores KHR_texture_transform of a light map. Therefore each object has a mesh whose TEXCOORD_1 is the uv
+in the page; instances share all other vertex data.
 
 Based on: Mozilla Hubs, `gltf-model-plus.js` (loader) and `io_hubs_addon` (exporter); T. Aoyagi, MOZ_lightmap.
 """
@@ -21,13 +22,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baker.core.atlas import page_uv
 from baker.encodings.hdr import hdr_file
-from baker.exporters.common import SCENE_NAME, black_lights, decode_page, irradiance_pages
+from baker.exporters.common import SCENE_NAME, black_lights, decode_page, irradiance_pages, separate_meshes
 from baker.exporters.unlit import exposure_for
+from baker.io.gltf.accessor import read_accessor
 from baker.io.gltf.ao_materials import material_holders
 from baker.io.gltf.chunks import split_glb
+from baker.io.gltf.document import open_document
 from baker.io.gltf.packer import Json, Packer, is_index, objects
 from baker.io.png import encode_png
+from baker.io.scene_folder import SceneFolder
 
 LIGHTMAP, RADIANCE = "MOZ_lightmap", "MOZ_texture_rgbe"
 
@@ -52,7 +57,8 @@ def lightmap_glb(bake: Path, manifest: dict[str, Any]) -> tuple[bytes, float]:
     """
     pages = np.stack([decode_page(bake, page["file"]).pixels for page in irradiance_pages(manifest)])
     intensity = 1.0 / exposure_for(pages, pages.max(axis=-1) > 0.0) if pages.any() else 1.0
-    chunks = split_glb((bake / SCENE_NAME).read_bytes(), SCENE_NAME)
+    data = (bake / SCENE_NAME).read_bytes()
+    chunks = split_glb(data, SCENE_NAME)
     document: Json = json.loads(chunks.json)
     count = len(document.get("buffers", []))
     packer = Packer(
@@ -60,12 +66,35 @@ def lightmap_glb(bake: Path, manifest: dict[str, Any]) -> tuple[bytes, float]:
     )
     packer.chunks = chunks.others
     first = _add_textures(packer, pages / np.float32(intensity))
-    page_of = {entry["mesh"]: entry["page"] for entry in manifest["instances"]}
+    page_of = _place_uv(packer, manifest, data)
     _add_lightmaps(document, {mesh: first + page for mesh, page in page_of.items()}, intensity)
     black_lights(document)
     used = document.setdefault("extensionsUsed", [])
     used += [name for name in (LIGHTMAP, RADIANCE) if name not in used]
     return packer.glb(), intensity
+
+
+def _place_uv(packer: Packer, manifest: dict[str, Any], data: bytes) -> dict[int, int]:
+    """Give each object a mesh whose TEXCOORD_1 is its uv in the page; return the page by mesh.
+
+    data : bytes, scene.glb
+    """
+    document = packer.document
+    source = open_document(Path(SCENE_NAME), data, SceneFolder(Path()))
+    mesh_of = separate_meshes(document, manifest)
+    known: dict[int, NDArray[np.float32]] = {}
+    for entry in manifest["instances"]:
+        scale, offset = entry["uv_scale"], entry["uv_offset"]
+        if (scale, offset) == ([1.0, 1.0], [0.0, 0.0]):
+            continue
+        for _, primitive in objects(document["meshes"][mesh_of[entry["node"]]], "primitives"):
+            number = primitive.get("attributes", {}).get("TEXCOORD_1")
+            if number is None:
+                continue
+            if number not in known:
+                known[number] = read_accessor(source, number, types=("VEC2",))
+            primitive["attributes"]["TEXCOORD_1"] = packer.add_floats(page_uv(known[number], scale, offset))
+    return {mesh_of[entry["node"]]: entry["page"] for entry in manifest["instances"]}
 
 
 def _add_textures(packer: Packer, pages: NDArray[np.float32]) -> int:

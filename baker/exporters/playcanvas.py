@@ -1,7 +1,7 @@
 """Writes files for PlayCanvas: scene.glb, the pages as Radiance HDR, and a module that loads both.
 
 PlayCanvas has no reader of EXR files. The module finds an object by its mesh, because PlayCanvas changes
-repeated names.
+repeated names. Therefore each object gets a mesh of its own; instances still share vertices and indices.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from baker.exporters.common import (
     describe,
     place_scene,
     read_manifest,
+    separate_meshes,
     template,
     write_json,
     write_readme,
@@ -36,10 +37,17 @@ class PlayCanvasExport:
         """Write the files of the export into `target`."""
         manifest = read_manifest(bake)
         description = describe(manifest)
-        place_scene(bake, target)
+        meshes: dict[int, int] = {}
+
+        def separate(document: dict[str, Any]) -> bool:
+            before = len(document["meshes"])
+            meshes.update(separate_meshes(document, manifest))
+            return len(document["meshes"]) > before
+
+        place_scene(bake, target, separate)
         for page in description["pages"]:
             page["file"] = _write_page(bake, page["file"], target)
-        write_json(target / DESCRIPTION_NAME, _with_meshes(description, manifest))
+        write_json(target / DESCRIPTION_NAME, _with_meshes(description, meshes))
         write_text(target / "lightmap.js", template("playcanvas", "lightmap.js"))
         write_readme(
             bake,
@@ -69,9 +77,8 @@ def _write_page(bake: Path, file: str, target: Path) -> str:
     return path.name
 
 
-def _with_meshes(description: dict[str, Any], manifest: dict[str, Any]) -> dict[str, Any]:
-    """Return the description with the index of the mesh of each object, which no other object has."""
-    meshes = {entry["node"]: entry["mesh"] for entry in manifest["instances"]}
+def _with_meshes(description: dict[str, Any], meshes: dict[int, int]) -> dict[str, Any]:
+    """Return the description with the mesh of each object; `meshes` maps nodes to indices of meshes."""
     return {
         **description,
         "objects": [{**entry, "mesh": meshes[entry["node"]]} for entry in description["objects"]],

@@ -20,7 +20,7 @@ from baker.core.export import EXPORTS
 from baker.core.geometry import world_geometry
 from baker.core.parallel import thread_count
 from baker.core.progress import silent
-from baker.core.scene import Material, Scene, Texture
+from baker.core.scene import Instance, Material, Mesh, Scene, Texture
 from baker.core.texels import TexelBuffer
 from baker.exporters.common import EXPOSURE_KEY, write_json, write_readme
 from baker.finish.dilate import dilate
@@ -111,16 +111,24 @@ def unlit_glb(bake: StoredBake, page: NDArray[np.float32], exposure: float) -> b
     exposure : float
     """
     kinds: list[tuple[int, Material]] = []
-    meshes = list(bake.scene.meshes)
+    meshes: list[Mesh] = []
+    instances: list[Instance] = []
     for instance, layout in zip(bake.scene.instances, bake.atlas.layouts, strict=True):
-        mesh = meshes[instance.mesh]
+        mesh = bake.scene.meshes[instance.mesh]
         used, index = np.unique(mesh.material, return_inverse=True)
         wanted = [(layout.page, _kind(bake.scene.materials[m])) for m in used.tolist()]
         kinds += [kind for kind in dict.fromkeys(wanted) if kind not in kinds]
         renumbered = np.array([kinds.index(kind) for kind in wanted], np.int32)[index]
-        meshes[instance.mesh] = replace(mesh, material=renumbered, texcoord=(None, None), colour=None)
+        # Each instance has a mesh of its own, because its uv are those of its page.
+        instances.append(replace(instance, mesh=len(meshes)))
+        meshes.append(replace(mesh, material=renumbered, texcoord=(None, None), colour=None))
     scene = replace(
-        bake.scene, meshes=tuple(meshes), materials=tuple(m for _, m in kinds), lights=(), source=None
+        bake.scene,
+        meshes=tuple(meshes),
+        instances=tuple(instances),
+        materials=tuple(m for _, m in kinds),
+        lights=(),
+        source=None,
     )
     packer, uses, _ = new_document(scene, bake.atlas)
     for use in uses:

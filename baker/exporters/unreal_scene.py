@@ -50,8 +50,8 @@ def split_scene(document: Json, description: Json, binary: bytes) -> dict[str, b
     document : dict
         glTF document with unique node names. Its materials keep only names and factors.
     description : dict
-        Content of `lightmap.json`; gets `materials` and `textures`, and each object `materials`, `location`,
-        `rotation`, `scale` and `sheared`.
+        Content of `lightmap.json`; gets `materials` and `textures`, and each object `mesh`, `materials`,
+        `location`, `rotation`, `scale` and `sheared`.
     binary : bytes
         The binary chunk with its 8-byte header.
 
@@ -65,6 +65,7 @@ def split_scene(document: Json, description: Json, binary: bytes) -> dict[str, b
     matrices = world_matrices(document)
     for entry in description["objects"]:
         mesh = document["meshes"][document["nodes"][entry["node"]]["mesh"]]
+        entry["mesh"] = mesh["name"]
         numbers = dict.fromkeys(primitive.get("material") for primitive in mesh["primitives"])
         for number in numbers:
             if number is not None and number not in materials:

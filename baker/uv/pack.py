@@ -7,6 +7,7 @@ that lookups at straight borders of charts need no interpolation between texels.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,23 @@ from baker.core.stage import Stage
 
 # Number of items to place times number of texels of the page, after which `progress` is called again.
 _CHUNK_WORK = 1 << 29
+
+
+class BlockSizes(Protocol):
+    """The sizes of blocks, which are rectangles of packed charts; see `baker.uv.blocks`.
+
+    The size of a block is not proportional to the density, because the gaps between its charts are constant.
+    """
+
+    @property
+    def shape(self) -> NDArray[np.int64]:
+        """Return the indices (B,) of the shapes that are blocks."""
+
+    def scale(self, density: NDArray[np.float64], page: tuple[int, int]) -> NDArray[np.float64]:
+        """Return the scale (B, 2) float64 of each block along u and v, texels per metre.
+
+        density : (B,) float64, texels per metre; page : (resolution, gap), see `pack`
+        """
 
 
 @dataclass(frozen=True)
@@ -35,6 +53,8 @@ class Shapes:
     rigid : (S,) bool
         Whether the shape is scaled uniformly. Other shapes are stretched so that their width and height are
         whole numbers of texels.
+    blocks : BlockSizes or None
+        Sizes of the shapes that are blocks; None if there are no blocks.
     """
 
     corner: NDArray[np.float64]
@@ -42,16 +62,21 @@ class Shapes:
     extent: NDArray[np.float64]
     area: NDArray[np.float64]
     rigid: NDArray[np.bool_]
+    blocks: BlockSizes | None = None
 
-    def scale(self, density: NDArray[np.float64]) -> NDArray[np.float64]:
+    def scale(self, density: NDArray[np.float64], page: tuple[int, int]) -> NDArray[np.float64]:
         """Return the scale (S, 2) float64 of each shape along u and v, texels per metre.
 
         density : (S,) float64, texels per metre, target density of each shape
+        page : (resolution, gap), see `pack`
         """
         wanted = self.extent * density[:, None]
         whole = np.maximum(np.round(wanted), 1.0)
         snapped = np.divide(whole, self.extent, out=np.ones_like(whole), where=self.extent > 1e-12)
-        return np.where(self.rigid[:, None] | (self.extent <= 1e-12), density[:, None], snapped)
+        scale = np.where(self.rigid[:, None] | (self.extent <= 1e-12), density[:, None], snapped)
+        if self.blocks is not None:
+            scale[self.blocks.shape] = self.blocks.scale(density[self.blocks.shape], page)
+        return scale
 
 
 @dataclass(frozen=True)
@@ -70,6 +95,8 @@ class Packing:
         Number of items that were placed; I if the packing is complete.
     placed_area : float
         Area of the placed items divided by the area of all items, gaps included.
+    gap : int
+        Number of empty texels between items.
     """
 
     position: NDArray[np.int32]
@@ -77,6 +104,7 @@ class Packing:
     height: int
     placed: int
     placed_area: float
+    gap: int
 
 
 def border(gap: int) -> int:
@@ -125,26 +153,72 @@ def pack(
     Packing
         Positions of the items. The packing is incomplete if not all items fit.
     """
-    from baker.uv.kernels.uv_pack import place_items
-
     resolution, gap = page
     margin = border(gap)
-    scale = shapes.scale(density)
-    size = shapes.extent * scale
-    n_rows = np.floor(size[:, 1] + 0.5 + 1e-9).astype(np.int64) + 1
-    n_columns = np.floor(size[:, 0] + 0.5 + 1e-9).astype(np.int64) + 1
-    position = np.zeros((len(item_shape), 2), np.int32)
+    scale = shapes.scale(density, page)
+    n_columns, n_rows = texel_size(shapes, scale)
     used = np.unique(item_shape)
     if (np.maximum(n_rows, n_columns)[used] > resolution - 2 * margin).any():
-        return Packing(position, scale, resolution, 0, 0.0)
-    first_row, low, high = _spans(shapes, scale, n_rows, used)
-    free = np.arange(resolution + 1, dtype=np.int16)
-    next_free = np.tile(free, (resolution, 1))
-    next_used = np.full((resolution, resolution + 1), resolution, np.int16)
+        return Packing(np.zeros((len(item_shape), 2), np.int32), scale, resolution, 0, 0.0, gap)
+    canvas = (resolution, resolution, margin)
+    return place_on_canvas(shapes, item_shape, scale, canvas, gap, progress, fraction)
+
+
+def texel_size(shapes: Shapes, scale: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the numbers of columns and of rows (S,) int64 of texels that each shape touches.
+
+    scale : (S, 2) float64, texels per metre
+    """
+    size = np.floor(shapes.extent * scale + 0.5 + 1e-9).astype(np.int64) + 1
+    return size[:, 0], size[:, 1]
+
+
+def place_on_canvas(
+    shapes: Shapes,
+    item_shape: NDArray[np.int64],
+    scale: NDArray[np.float64],
+    canvas: tuple[int, int, int],
+    gap: int,
+    progress: Progress,
+    fraction: float,
+) -> Packing:
+    """Place items of given scales on a canvas, from the lowest row up.
+
+    Parameters
+    ----------
+    shapes : Shapes
+        The S outlines.
+    item_shape : (I,) int64
+        Shape of each item.
+    scale : (S, 2) float64, texels per metre
+        Scale of each shape along u and v.
+    canvas : (width, height, margin)
+        Columns and rows of the canvas, and number of empty texels along its border.
+    gap : int
+        Number of empty texels between items.
+    progress : Progress
+        Called with `fraction`.
+    fraction : float
+        Fraction of the stage.
+
+    Returns
+    -------
+    Packing
+        Positions of the items. The packing is incomplete if not all items fit.
+    """
+    from baker.uv.kernels.uv_pack import place_items
+
+    width, height, margin = canvas
+    n_columns, n_rows = texel_size(shapes, scale)
+    position = np.zeros((len(item_shape), 2), np.int32)
+    first_row, low, high = _spans(shapes, scale, n_rows, np.unique(item_shape))
+    free = np.arange(width + 1, dtype=np.int16)
+    next_free = np.tile(free, (height, 1))
+    next_used = np.full((height, width + 1), width, np.int16)
     order = np.lexsort((np.arange(len(item_shape)), item_shape, -n_columns[item_shape], -n_rows[item_shape]))
     lowest = np.full(len(n_rows), margin, np.int64)
     placed = 0
-    step = max(16, _CHUNK_WORK // resolution**2)
+    step = max(16, _CHUNK_WORK // (width * height))
     for start in range(0, len(order), step):
         report(progress, Stage.UNWRAP, fraction)
         chunk = order[start : start + step]
@@ -158,7 +232,7 @@ def pack(
     top = position[done, 1] + n_rows[item_shape[done]]
     weight = (n_rows + gap) * (n_columns + gap)
     share = weight[item_shape[done]].sum() / max(1, weight[item_shape].sum())
-    return Packing(position, scale, int(top.max(initial=0)) + margin, placed, float(share))
+    return Packing(position, scale, int(top.max(initial=0)) + margin, placed, float(share), gap)
 
 
 def _spans(

@@ -158,16 +158,22 @@ def join_atlases(scene: Scene, groups: Sequence[PageGroup], atlases: Sequence[At
     if len(groups) == 1 and not groups[0].hidden:
         return atlases[0]
     layouts: dict[int, InstanceLayout] = {}
-    n_pages = n_charts = n_hidden = 0
+    n_pages = n_charts = n_hidden = n_shared = 0
     for group, atlas in zip(groups, atlases, strict=True):
+        numbers = [layout.shared.number for layout in atlas.layouts if layout.shared is not None]
         for member, layout in zip(group.members, atlas.layouts, strict=True):
+            shared = layout.shared
+            if shared is not None:
+                shared = replace(shared, number=shared.number + n_shared)
             layouts[member] = replace(
                 layout,
                 instance=member,
                 page=layout.page + n_pages,
                 chart=layout.chart + np.int32(n_charts),
                 receives=not group.hidden,
+                shared=shared,
             )
+        n_shared += max(numbers, default=-1) + 1
         n_pages += atlas.n_pages
         n_charts += atlas.n_charts
         n_hidden += atlas.n_pages if group.hidden else 0

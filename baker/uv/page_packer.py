@@ -78,6 +78,12 @@ class PagePacker:
         first = self.outlines.first_item
         return np.concatenate([np.arange(first[i], first[i + 1]) for i in instance])
 
+    def per_shape(self, density: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the density (S,) of each shape; `density` (I,) is that of each instance."""
+        result = np.ones(len(self.outlines.shapes.extent))
+        result[self.outlines.item_shape] = np.repeat(density, np.diff(self.outlines.first_item))
+        return result
+
     def finish(self, instance: NDArray[np.int64], density: NDArray[np.float64], packing: Packing) -> Page:
         """Return a page of packed instances; `density` (I,) is that of all instances."""
         first = self.outlines.first_item
@@ -93,9 +99,8 @@ class PagePacker:
         """Return a page of instances at densities (I,) of all instances; None if they do not fit."""
         items = self.items(instance)
         shape = self.outlines.item_shape[items]
-        wanted = np.ones(len(self.outlines.shapes.extent))
-        first = self.outlines.first_item
-        wanted[shape] = np.repeat(density[instance], first[instance + 1] - first[instance])
+        # Set the densities of all shapes: the layout of a block depends on all instances that share it.
+        wanted = self.per_shape(density)
         packing = pack(self.outlines.shapes, shape, wanted, self.page, self.progress, self.fraction)
         return packing if packing.placed == len(items) else None
 
@@ -104,8 +109,13 @@ class PagePacker:
         gap = self.page[1]
         shapes, item = self.outlines.shapes, self.outlines.item_shape
         per_item = np.repeat(density, np.diff(self.outlines.first_item))
-        area = shapes.area[item] * per_item**2
-        texels = area + shapes.extent[item].sum(axis=1) * per_item * (1 + gap) + (1 + gap) ** 2
+        area, edges = shapes.area[item] * per_item**2, shapes.extent[item] * per_item[:, None]
+        if shapes.blocks is not None:
+            size = shapes.extent * shapes.scale(self.per_shape(density), self.page)
+            block = np.isin(item, shapes.blocks.shape)
+            edges[block] = size[item[block]]
+            area[block] = edges[block].prod(axis=1)
+        texels = area + edges.sum(axis=1) * (1 + gap) + (1 + gap) ** 2
         inner = self.page[0] - 2 * border(gap)
         return np.add.reduceat(texels, self.outlines.first_item[:-1]) / max(1, inner) ** 2
 

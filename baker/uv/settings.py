@@ -21,6 +21,7 @@ class UnwrapSettings(Settings):
     max_pages: int = same_setting(BakeSettings, "max_pages")
     padding: int = same_setting(BakeSettings, "padding")
     uv: Literal["auto", "keep", "unwrap"] = same_setting(BakeSettings, "uv")
+    instances: Literal["share", "unique"] = same_setting(BakeSettings, "instances")
     unwrapper: Literal["xatlas"] = same_setting(BakeSettings, "unwrapper")
     threads: int | None = same_setting(BakeSettings, "threads")
 

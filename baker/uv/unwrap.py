@@ -14,11 +14,12 @@ from baker.core.progress import Progress, report, silent
 from baker.core.scene import Instance, Mesh, Scene, SceneWarning
 from baker.core.settings import BakeSettings
 from baker.core.stage import Stage
+from baker.uv.blocks import with_blocks
 from baker.uv.charts import MeshCharts, chart_meshes
 from baker.uv.check import PAGE_TOLERANCE, page_overlap, uv_area
 from baker.uv.density_share import object_shares
 from baker.uv.keep import KeptUv, choose_kept, close_charts, kept_charts, lightmap_uv
-from baker.uv.outlines import CutInstance, RigidInstance, make_outlines, place_uv
+from baker.uv.outlines import BlockInstance, CutInstance, Placement, RigidInstance, make_outlines
 from baker.uv.page_groups import (
     hidden_density,
     join_atlases,
@@ -28,10 +29,10 @@ from baker.uv.page_groups import (
 )
 from baker.uv.page_packer import DensityLimits
 from baker.uv.pages import fill_pages
+from baker.uv.place import PackedScene, place_instances
+from baker.uv.shared import repeated_meshes, shared_sizes
+from baker.uv.stretch import world_stretch
 
-# Limit of the relative difference between the scales of an instance along different axes. Up to this limit,
-# the scale is treated as uniform.
-_EVEN_SCALE = 1e-4
 # Fraction of the stage "unwrap" at which cutting ends and packing starts.
 _CUT_UNTIL = 0.7
 _NONE = np.zeros(0, np.int32)
@@ -162,10 +163,11 @@ def _lay_out(
     # Leave out instances without triangles.
     filled = [k for k, i in enumerate(scene.instances) if len(scene.meshes[i.mesh].triangle)]
     shares, fixed = object_shares(scene, [scene.instances[k] for k in filled], settings.density)
-    placements, cuts = _placements(scene, filled, shares, kept.usable)
+    repeated = repeated_meshes(scene, filled, settings)
+    placements, cuts = _placements(scene, filled, (shares, fixed), kept.usable, repeated)
     found = list(kept.warnings)
     charts = _cut(scene, cuts, settings, progress, found)
-    outlines = make_outlines(placements, charts)
+    outlines = with_blocks(make_outlines(placements, charts), placements, charts, progress)
     names = [scene.instances[k].name or scene.meshes[scene.instances[k].mesh].name for k in filled]
     limits = DensityLimits(fixed, *bounds)
     pages, packing_warnings = fill_pages(outlines, names, settings, progress, limits)
@@ -176,16 +178,9 @@ def _lay_out(
         )
         for k, i in enumerate(scene.instances)
     ]
-    for number, page in enumerate(pages):
-        for slot, position, density in zip(page.instance, page.position, page.density, strict=True):
-            uv = place_uv(
-                outlines, int(slot), placements[slot], charts, page.packing, position, settings.resolution
-            )
-            k = filled[slot]
-            mesh = scene.meshes[scene.instances[k].mesh]
-            vertex, triangle, chart = _structure(mesh, placements[slot], charts)
-            scaled = float(density * shares[slot])
-            layouts[k] = InstanceLayout(k, number, vertex, uv, triangle, chart, False, scaled)
+    packed = PackedScene(scene, filled, placements, charts, outlines, pages, repeated, settings.resolution)
+    for layout in place_instances(packed, shares.tolist()):
+        layouts[layout.instance] = layout
     # Number the charts over all instances, in the order of instances.
     n_charts = 0
     for k in filled:
@@ -196,26 +191,43 @@ def _lay_out(
 
 
 def _placements(
-    scene: Scene, filled: list[int], shares: NDArray[np.float64], usable: NDArray[np.bool_]
-) -> tuple[list[CutInstance | RigidInstance], list[_Cut]]:
+    scene: Scene,
+    filled: list[int],
+    density: tuple[NDArray[np.float64], NDArray[np.bool_]],
+    usable: NDArray[np.bool_],
+    repeated: set[int],
+) -> tuple[list[Placement], list[_Cut]]:
     """Return the placement of each instance in `filled`, and the distinct pairs of mesh and stretch to cut.
 
-    filled : indices of n instances; shares : (n,), factors on their density; usable : (I,) bool, see `KeptUv`
+    filled : indices of n instances; density : result of `object_shares`; usable : (I,) bool, see `KeptUv`
+    repeated : meshes whose instances share TEXCOORD_1
     """
-    placements: list[CutInstance | RigidInstance] = []
+    placements: list[Placement] = []
     cuts: list[_Cut] = []
     index: dict[tuple[int, bytes], int] = {}
-    for k, share in zip(filled, shares.tolist(), strict=True):
+    sizes = {
+        k: (float(share), bool(fixed))
+        for k, share, fixed in zip(filled, *density, strict=True)
+        if not usable[k] and scene.instances[k].mesh in repeated
+    }
+    shared = shared_sizes(scene, sizes)
+    for k, share in zip(filled, density[0].tolist(), strict=True):
         instance = scene.instances[k]
         if usable[k]:
             placements.append(_rigid(scene.meshes[instance.mesh], instance, share))
             continue
-        factor, stretch = _world_stretch(instance.world_from_object)
+        if k in shared:
+            factor, stretch = shared[k].factor, shared[k].stretch
+        else:
+            factor, stretch = world_stretch(instance.world_from_object)
         key = (instance.mesh, stretch.tobytes())
         if key not in index:
             index[key] = len(cuts)
             cuts.append(_Cut(instance.mesh, stretch))
-        placements.append(CutInstance(index[key], factor * share))
+        if k in shared:
+            placements.append(BlockInstance(index[key], factor * share, shared[k].layout))
+        else:
+            placements.append(CutInstance(index[key], factor * share))
     return placements, cuts
 
 
@@ -238,16 +250,6 @@ def _cut(
     return charts
 
 
-def _structure(
-    mesh: Mesh, placement: CutInstance | RigidInstance, charts: list[MeshCharts]
-) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-    """Return `vertex` (V',), `triangle` (T, 3) and `chart` (T,), int32, of an instance's `InstanceLayout`."""
-    if isinstance(placement, RigidInstance):
-        return np.arange(len(mesh.position), dtype=np.int32), mesh.triangle, kept_charts(mesh)
-    own = charts[placement.charts]
-    return own.vertex, own.triangle, own.chart
-
-
 def _verify(
     layouts: list[InstanceLayout], n_pages: int, resolution: int, scene: Scene, progress: Progress
 ) -> list[SceneWarning]:
@@ -267,31 +269,12 @@ def _verify(
                 found.append(
                     SceneWarning("uv.overlap", f"{share:.3g}% of '{name}' overlaps in the lightmap", name)
                 )
-            if not (layout.uv.min() >= 0.0 and layout.uv.max() <= 1.0):
+            used = layout.uv[layout.triangle]
+            if not (used.min() >= 0.0 and used.max() <= 1.0):
                 found.append(
                     SceneWarning("uv.out_of_range", f"the lightmap uv of '{name}' leaves its page", name)
                 )
     return found
-
-
-def _world_stretch(world_from_object: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-    """Split the effect of a transform on lengths into a factor and a symmetric (3, 3) stretch.
-
-    If the scale is uniform, the factor is the scale and the stretch is the identity, so that all uniformly
-    scaled instances of a mesh share their charts. Otherwise the factor is 1 and the stretch is the square
-    root of M^T M, where M is the linear part of the transform. This stretch does not depend on rotations and
-    mirrors in the transform.
-    """
-    linear = world_from_object[:3, :3].astype(np.float64)
-    gram = linear.T @ linear
-    even = float(np.sqrt(np.trace(gram) / 3.0))
-    if np.abs(gram - even * even * np.eye(3)).max() <= 2.0 * _EVEN_SCALE * even * even:
-        return float(f"{even:.6g}"), np.eye(3)
-    value, vector = np.linalg.eigh(gram)
-    root = (vector * np.sqrt(np.maximum(value, 0.0))) @ vector.T
-    # Round, so that instances share their charts if their transforms differ by rounding errors only.
-    digits = 5 - int(np.floor(np.log10(np.abs(root).max())))
-    return 1.0, np.round(0.5 * (root + root.T), digits) + 0.0
 
 
 def _rigid(mesh: Mesh, instance: Instance, share: float) -> RigidInstance:

@@ -107,6 +107,7 @@ OTHER = {
     "budget": ("3x256", "3x256"),
     "padding": ("2", 2),
     "uv": ("keep", "keep"),
+    "instances": ("unique", "unique"),
     "unwrapper": ("xatlas", "xatlas"),
     "quality": ("high", "high"),
     "samples": ("10", 10),

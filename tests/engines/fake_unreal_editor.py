@@ -39,11 +39,17 @@ class Actor(Object):
 
 class StaticMeshComponent(Object):
     properties = {"static_mesh": None}
+    # Materials by slot that replace those of the mesh.
+    materials = {}
 
     def set_static_mesh(self, new_mesh):
         assert isinstance(new_mesh, StaticMesh)
         self.values["static_mesh"] = new_mesh
         return True
+
+    def set_material(self, element_index, material):
+        assert isinstance(material, MaterialInterface)
+        self.materials = {**self.materials, element_index: material}
 
 
 class StaticMeshActor(Actor):

@@ -13,6 +13,7 @@ from proof import (
     shows_the_probe,
     shows_the_room,
 )
+from shared_probe import shows_the_squares, write_shared_probe
 
 pytestmark = pytest.mark.engines
 
@@ -63,3 +64,13 @@ def test_a_wrong_export_fails(browser, probe, tmp_path, right, wrong):
 def test_srgb_numbers_in_the_pages_fail(browser, tmp_path):
     out = write_probe(tmp_path, "babylon", page=srgb_page())
     assert shows_something_else(draw(browser, out / "babylon", "babylon", camera="front"))
+
+
+def test_instances_of_a_mesh_have_their_own_places(browser, tmp_path):
+    out = write_shared_probe(tmp_path, "babylon")
+    assert shows_the_squares(draw(browser, out / "babylon", "babylon", camera="front"))
+    right, wrong = "createInstances = false", "createInstances = true"
+    copy = changed(out / "babylon", tmp_path / "wrong", "lightmap.js", right, wrong)
+    # Babylon.js reports that an instance cannot have a material of its own.
+    with pytest.raises(AssertionError):
+        draw(browser, copy, "babylon", camera="front")

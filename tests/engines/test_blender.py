@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from engine_scenes import QUADRANT, probe_expected, srgb_page, write_probe
 from proof import changed, lower_left_quarter, middles, shows_something_else, shows_the_probe, shows_the_room
+from shared_probe import shows_the_squares, write_shared_probe
 
 from baker.encodings.exr import decode_exr
 
@@ -67,3 +68,11 @@ def test_a_wrong_export_fails(probe, tmp_path, right, wrong):
 def test_srgb_numbers_in_the_pages_fail(tmp_path):
     out = write_probe(tmp_path / "srgb", "blender", page=srgb_page())
     assert shows_something_else(draw(out / "blender", tmp_path))
+
+
+def test_instances_of_a_mesh_have_their_own_places(tmp_path):
+    out = write_shared_probe(tmp_path, "blender")
+    assert shows_the_squares(draw(out / "blender", tmp_path))
+    right, wrong = 'slot.link = "OBJECT"', 'slot.link = "DATA"'
+    copy = changed(out / "blender", tmp_path / "wrong", "import_lightmaps.py", right, wrong)
+    assert not shows_the_squares(draw(copy, tmp_path))

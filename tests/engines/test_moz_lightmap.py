@@ -8,6 +8,7 @@ import struct
 import pytest
 from engine_scenes import ALBEDO, probe_expected
 from proof import draw, middles, shows_something_else, shows_the_probe
+from shared_probe import shows_the_squares, write_shared_probe
 
 pytestmark = pytest.mark.engines
 # A standard material shows up to 2 % less than albedo x E / pi, because it also reflects specularly. In the
@@ -75,3 +76,10 @@ def test_a_wrong_file_fails(browser, probe, tmp_path, change):
 def test_metals_would_be_black(browser, probe, tmp_path):
     picture = draw(browser, edited(probe / "gltf", tmp_path, metal), camera="front", moz="hubs")
     assert middles(picture).max() < 0.01 * min(ALBEDO) * probe_expected().max()
+
+
+@pytest.mark.parametrize("loader", ["hubs", "addon"])
+def test_instances_of_a_mesh_have_their_own_places(browser, tmp_path, loader):
+    out = write_shared_probe(tmp_path, "gltf")
+    picture = draw(browser, out / "gltf", camera="front", moz=loader)
+    assert shows_the_squares(picture, REL)

@@ -13,6 +13,7 @@ from proof import (
     shows_the_probe,
     shows_the_room,
 )
+from shared_probe import shows_the_squares, write_shared_probe
 
 pytestmark = pytest.mark.engines
 
@@ -58,3 +59,11 @@ def test_a_wrong_export_fails(browser, probe, tmp_path, right, wrong):
 def test_srgb_numbers_in_the_pages_fail(browser, tmp_path):
     out = write_probe(tmp_path, "playcanvas", page=srgb_page())
     assert shows_something_else(draw(browser, out / "playcanvas", "playcanvas", camera="front"))
+
+
+def test_instances_of_a_mesh_have_their_own_places(browser, tmp_path):
+    out = write_shared_probe(tmp_path, "playcanvas")
+    assert shows_the_squares(draw(browser, out / "playcanvas", "playcanvas", camera="front"), REL)
+    right, wrong = "lit.lightMapTiling =", "lit.tiling ="
+    copy = changed(out / "playcanvas", tmp_path / "wrong", "lightmap.js", right, wrong)
+    assert not shows_the_squares(draw(browser, copy, "playcanvas", camera="front"), REL)

@@ -21,6 +21,7 @@ from proof import (
     shows_the_probe,
     shows_the_room,
 )
+from shared_probe import shows_the_squares, write_shared_probe
 
 pytestmark = pytest.mark.engines
 
@@ -100,3 +101,11 @@ def test_a_wrong_export_fails(browser, probe, tmp_path, right, wrong, matte):
 def test_srgb_numbers_in_the_pages_fail(browser, tmp_path):
     out = write_probe(tmp_path, "three", page=srgb_page())
     assert shows_something_else(draw(browser, out / "three", camera="front"))
+
+
+@pytest.mark.parametrize("ao", [False, True])
+def test_instances_of_a_mesh_have_their_own_places(browser, tmp_path, ao):
+    out = write_shared_probe(tmp_path, "three", ao=ao)
+    assert shows_the_squares(draw(browser, out / "three", camera="front"))
+    wrong = changed(out / "three", tmp_path / "wrong", "lightmap.js", "offset.set(offsetU", "offset.set(0")
+    assert not shows_the_squares(draw(browser, wrong, camera="front"))

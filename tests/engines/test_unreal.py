@@ -11,6 +11,7 @@ from engine_scenes import ALBEDO, MIDDLE, SIZE, probe_expected, write_made_up, w
 from fake_unreal import DialogError, StaticMesh, shown
 from fake_unreal_editor import Editor
 from gltf_builder import QUAD, QUAD_NORMAL, QUAD_TRIANGLE, GltfBuilder
+from shared_probe import FIELD, SQUARES, write_shared_probe
 
 from baker.exporters.unreal_scene import actor_transform
 from baker.io.load import load_scene
@@ -27,10 +28,12 @@ def probe(tmp_path_factory):
 def slots(editor, name=NAME):
     """Return the material instances of an object in the open level."""
     (actor,) = (a for a in editor.here() if a.label == name)
-    mesh = actor.values["static_mesh_component"].values["static_mesh"]
+    component = actor.values["static_mesh_component"]
+    mesh = component.values["static_mesh"]
     assert mesh.uv_1_of_file
     assert mesh.precise
-    return [slot.values["material_interface"] for slot in mesh.values["static_materials"]]
+    own = [slot.values["material_interface"] for slot in mesh.values["static_materials"]]
+    return [component.materials.get(number, material) for number, material in enumerate(own)]
 
 
 def picture(editor):
@@ -342,3 +345,18 @@ def test_a_uv_set_that_the_materials_do_not_have_is_reported(level, tmp_path):
     assert [o["materials"] for o in description["objects"]] == [
         ["plain_m0", "leaves_m1", "glass_m2", "screen_m3"]
     ]
+
+
+def test_objects_with_one_mesh_have_their_own_materials(tmp_path):
+    out = write_shared_probe(tmp_path, "unreal") / "unreal"
+    editor = Editor()
+    editor.run(out / "import_lightmaps.py")
+    names = [f"square_n{number}" for number in range(4)]
+    components = [a.values["static_mesh_component"] for a in editor.here()]
+    assert len({id(c.values["static_mesh"]) for c in components}) == 1
+    for name, (_, _, (u, v)) in zip(names, SQUARES, strict=True):
+        (instance,) = slots(editor, name)
+        points = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)]
+        found = np.array([shown(instance, [(0.3, 0.3), point])[0] for point in points])
+        fields = [FIELD[int(4 * (0.5 * y + v)), int(4 * (0.5 * x + u))] for x, y in points]
+        assert found == pytest.approx(np.array(fields)[:, None] * np.array(ALBEDO), rel=1e-3)

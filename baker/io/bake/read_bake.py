@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.atlas import Atlas, InstanceLayout
+from baker.core.atlas import Atlas, InstanceLayout, page_uv
 from baker.core.encoding import encoding_of
 from baker.core.errors import InputError, SettingsError
 from baker.core.read_options import ReadOptions
@@ -202,12 +202,11 @@ def _layout(folder: Path, scene: Scene, index: int, row: dict[str, Any] | None) 
     if row is None or uv is None:
         message = "the object has no lightmap uv or is not in the manifest; bake the scene again"
         raise InputError(message, file=str(folder / SCENE_NAME), object=instance.name)
-    placed = uv.astype(np.float64) * row["uv_scale"] + row["uv_offset"]
     return InstanceLayout(
         instance=index,
         page=int(row["page"]),
         vertex=np.arange(len(mesh.position), dtype=np.int32),
-        uv=placed.astype(np.float32),
+        uv=page_uv(uv, row["uv_scale"], row["uv_offset"]),
         triangle=mesh.triangle,
         chart=np.full(len(mesh.triangle), index, np.int32),
         kept=row.get("uv") == "kept",

@@ -1,7 +1,7 @@
 """Adds the AO pages to materials as occlusion textures, and updates `texCoord` if a uv set was renumbered.
 
-If primitives that share a material need different pages or uv sets, the material is copied. Copies are
-appended, so existing indices stay valid.
+If primitives that share a material need different pages, places or uv sets, the material is copied. Copies
+are appended, so existing indices stay valid.
 
 Based on: Khronos Group, glTF 2.0 specification, 5.19 Material; KHR_texture_transform; KHR_materials_variants.
 """
@@ -9,10 +9,14 @@ Based on: Khronos Group, glTF 2.0 specification, 5.19 Material; KHR_texture_tran
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
+from baker.core.atlas import SharedUv
 from baker.io.gltf.packer import Json, Packer, is_index, objects
+
+TEXTURE_TRANSFORM = "KHR_texture_transform"
 
 
 @dataclass(frozen=True)
@@ -27,11 +31,14 @@ class BakedUse:
         Page of its lightmap.
     moved : int or None
         New TEXCOORD number of the uv set that was TEXCOORD_1 in the input; None if it was not renumbered.
+    shared : SharedUv or None
+        Place of TEXCOORD_1 in the page, see `InstanceLayout`; None if TEXCOORD_1 is the page uv.
     """
 
     primitive: Json
     page: int
     moved: int | None = None
+    shared: SharedUv | None = None
 
 
 def add_ao_textures(packer: Packer, ao_png: dict[int, bytes]) -> dict[int, int]:
@@ -114,7 +121,7 @@ def assign_materials(document: Json, uses: list[BakedUse], ao_texture: dict[int,
         Texture index by page; empty if AO was not baked.
     """
     baked = {id(use.primitive): use for use in uses}
-    wanted: dict[int, dict[tuple[int, int], list[Json]]] = {}
+    wanted: dict[int, dict[_Change, list[Json]]] = {}
     for _, mesh in objects(document, "meshes"):
         for _, primitive in objects(mesh, "primitives"):
             use = baked.get(id(primitive))
@@ -136,11 +143,44 @@ def assign_materials(document: Json, uses: list[BakedUse], ao_texture: dict[int,
                 document.setdefault("materials", []).append(material)
                 for holder in needs[need]:
                     holder["material"] = len(document["materials"]) - 1
-            _apply(material, *need)
+            _apply(material, need)
+            if need.transform != _WHOLE:
+                use_extension(document, TEXTURE_TRANSFORM)
+
+
+class _Change(NamedTuple):
+    """The change of a material that a primitive needs; -1 for no change.
+
+    Attributes
+    ----------
+    texture : int
+        Index of the AO texture.
+    moved : int
+        New TEXCOORD number of the old set 1.
+    transform : (float, float, float, float)
+        Scale and offset of TEXCOORD_1 in the AO texture.
+    """
+
+    texture: int
+    moved: int
+    transform: tuple[float, ...]
 
 
 _NONE = -1
-_UNCHANGED = (-1, -1)
+_WHOLE = (1.0, 1.0, 0.0, 0.0)
+_UNCHANGED = _Change(-1, -1, _WHOLE)
+
+
+def use_extension(document: Json, name: str) -> None:
+    """Add `name` to the `extensionsUsed` of a document, unless it is there."""
+    used = document.setdefault("extensionsUsed", [])
+    if name not in used:
+        used.append(name)
+
+
+def texture_place(scale: Sequence[float], offset: Sequence[float]) -> Json:
+    """Return the `extensions` of a texture info that reads TEXCOORD_1 x `scale` + `offset`."""
+    return {TEXTURE_TRANSFORM: {"offset": list(offset), "scale": list(scale)}}
 
 
 def _names_material(document: Json, index: object) -> bool:
@@ -149,26 +189,27 @@ def _names_material(document: Json, index: object) -> bool:
     return is_index(index) and index < len(materials) and isinstance(materials[index], dict)
 
 
-def _need(document: Json, index: int, use: BakedUse | None, ao_texture: dict[int, int]) -> tuple[int, int]:
-    """Return the change of a material that a primitive needs.
-
-    The change is (index of the AO texture, new TEXCOORD number of the old set 1), each -1 for no change.
-    """
+def _need(document: Json, index: int, use: BakedUse | None, ao_texture: dict[int, int]) -> _Change:
+    """Return the change of a material that a primitive needs."""
     if use is None:
         return _UNCHANGED
     texture = ao_texture.get(use.page, -1)
+    transform = _WHOLE if use.shared is None or texture < 0 else (*use.shared.scale, *use.shared.offset)
     if index == _NONE or use.moved is None:
-        return texture, -1
+        return _Change(texture, -1, transform)
     infos = _texture_infos(document["materials"][index], occlusion=texture < 0)
-    return texture, use.moved if any(_texcoord(info) == 1 for info in infos) else -1
+    return _Change(texture, use.moved if any(_texcoord(info) == 1 for info in infos) else -1, transform)
 
 
-def _apply(material: Json, texture: int, moved: int) -> None:
+def _apply(material: Json, change: _Change) -> None:
+    texture, moved, transform = change
     if texture >= 0:
         material["occlusionTexture"] = {"index": texture, "texCoord": 1, "strength": 1.0}
+        if transform != _WHOLE:
+            material["occlusionTexture"]["extensions"] = texture_place(transform[:2], transform[2:])
     if moved >= 0:
         for info in _texture_infos(material, occlusion=texture < 0):
-            transform = info.get("extensions", {}).get("KHR_texture_transform", {})
+            transform = info.get("extensions", {}).get(TEXTURE_TRANSFORM, {})
             for holder in (info, transform):
                 if holder.get("texCoord") == 1:
                     holder["texCoord"] = moved
@@ -176,7 +217,7 @@ def _apply(material: Json, texture: int, moved: int) -> None:
 
 def _texcoord(info: Json) -> int:
     """Return the TEXCOORD number that a texture info reads; KHR_texture_transform takes precedence."""
-    transform = info.get("extensions", {}).get("KHR_texture_transform", {})
+    transform = info.get("extensions", {}).get(TEXTURE_TRANSFORM, {})
     return int(transform.get("texCoord", info.get("texCoord", 0)))
 
 

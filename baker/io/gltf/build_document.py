@@ -42,7 +42,8 @@ def new_document(scene: Scene, atlas: Atlas) -> tuple[Packer, list[BakedUse], li
     packer : Packer
         The document with its data.
     uses : list of BakedUse
-        The document's primitives, which all have lightmap uv.
+        The document's primitives, which all have lightmap uv. Instances that share TEXCOORD_1 have the same
+        primitives.
     instance_mesh : list of int
         Index of each instance's mesh in the document.
     """
@@ -58,24 +59,32 @@ def new_document(scene: Scene, atlas: Atlas) -> tuple[Packer, list[BakedUse], li
     uses: list[BakedUse] = []
     instance_mesh = [0] * len(order)
     nodes, meshes = document.setdefault("nodes", []), document.setdefault("meshes", [])
+    of_shared: dict[int, int] = {}
     for index in order:
         instance = everything[index]
         layout = atlas.layouts[index] if index < len(atlas.layouts) else None
         mesh = _with_original_materials(scene, scene.meshes[instance.mesh])
         node, shown = _node(instance, mesh)
         mirrored = shown is not mesh and _mirrors(instance)
+        number = -1
         if layout is None or not layout.receives:
             primitives = _primitives(packer, shown, _plain_layout(shown), mirrored=mirrored)
             for primitive in primitives:
                 unused = primitive["attributes"].pop("TEXCOORD_1")
                 if primitive["attributes"]["TEXCOORD_0"] == unused:
                     del primitive["attributes"]["TEXCOORD_0"]
+            meshes.append({"name": mesh.name, "primitives": primitives})
         else:
-            primitives = _primitives(packer, shown, layout, mirrored=mirrored)
-            uses += [BakedUse(primitive, layout.page) for primitive in primitives]
-        instance_mesh[index] = len(meshes)
-        nodes.append({**node, "mesh": len(meshes)})
-        meshes.append({"name": mesh.name, "primitives": primitives})
+            if layout.shared is not None and shown is mesh:
+                number = layout.shared.number
+            if number not in of_shared:
+                primitives = _primitives(packer, shown, layout, mirrored=mirrored)
+                uses += [BakedUse(primitive, layout.page, shared=layout.shared) for primitive in primitives]
+                meshes.append({"name": mesh.name, "primitives": primitives})
+        instance_mesh[index] = of_shared.get(number, len(meshes) - 1)
+        nodes.append({**node, "mesh": instance_mesh[index]})
+        if number >= 0:
+            of_shared[number] = instance_mesh[index]
     if scene.lights:
         extensions.add("KHR_lights_punctual")
         document["extensions"] = {
@@ -162,7 +171,7 @@ def _primitives(packer: Packer, mesh: Mesh, layout: InstanceLayout, *, mirrored:
         attributes = {
             "POSITION": packer.add_floats(mesh.position[vertex], bounds=True),
             "NORMAL": packer.add_floats(mesh.normal[vertex]),
-            "TEXCOORD_1": packer.add_floats(layout.uv[used]),
+            "TEXCOORD_1": packer.add_floats(layout.texcoord_1[used]),
         }
         first = mesh.texcoord[0] if mesh.texcoord else None
         attributes["TEXCOORD_0"] = (

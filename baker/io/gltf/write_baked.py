@@ -13,7 +13,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from baker.core.atlas import Atlas, InstanceLayout
+from baker.core.atlas import Atlas, InstanceLayout, SharedUv
 from baker.core.errors import InputError
 from baker.core.scene import Instance, Mesh, Scene, SourceDocument
 from baker.core.version import VERSION
@@ -21,7 +21,8 @@ from baker.io.gltf.accessor_bytes import gather_rows
 from baker.io.gltf.ao_materials import BakedUse, add_ao_textures, assign_materials, reads_texcoord_1
 from baker.io.gltf.build_document import new_document
 from baker.io.gltf.dangling import break_dangling
-from baker.io.gltf.packer import Json, Packer, is_index, objects, primitive_accessors
+from baker.io.gltf.packer import Json, Packer, objects, primitive_accessors
+from baker.io.gltf.shared_meshes import own_meshes, separate_materials
 from baker.io.gltf.uri import UriError, is_data, read_uri
 from baker.io.scene_folder import OutsideName, SceneFolder
 
@@ -40,7 +41,8 @@ class GlbFile:
     data : bytes
         The content of the file.
     instance_mesh : tuple of int
-        Index of each instance's mesh in the file, in the order of `Scene.instances`.
+        Index of each instance's mesh in the file, in the order of `Scene.instances`. Instances that share
+        TEXCOORD_1 have the same mesh, or with AO meshes that refer to the same accessors.
     """
 
     data: bytes
@@ -56,8 +58,10 @@ class _Piece:
     primitive, source : dict
         The primitive in the output and in the source document.
     page : int
+    shared : SharedUv or None
+        Place of the uv in the page, see `InstanceLayout`.
     row : (V,) int32, source vertex of each vertex
-    uv : (V, 2) float32, lightmap uv
+    uv : (V, 2) float32, TEXCOORD_1
     triangle : (T, 3) int64
     kept : bool
         Whether TEXCOORD_1 of the primitive equals `uv` already, so that the primitive is not rewritten.
@@ -66,6 +70,7 @@ class _Piece:
     primitive: Json
     source: Json
     page: int
+    shared: SharedUv | None
     row: NDArray[np.int32]
     uv: NDArray[np.float32]
     triangle: NDArray[np.int64]
@@ -99,8 +104,14 @@ def make_glb(scene: Scene, atlas: Atlas, ao_png: dict[int, bytes] | None = None)
     """
     if scene.source is None:
         packer, uses, instance_mesh = new_document(scene, atlas)
+        order = sorted(range(len(scene.instances)), key=lambda i: (scene.instances[i].node, i))
+        nodes = [order.index(i) for i in range(len(order))]
     else:
         packer, uses, instance_mesh = _rewrite(scene, scene.source, atlas, ao=bool(ao_png))
+        nodes = [instance.node for instance in scene.instances]
+    if ao_png:
+        placed = list(zip(nodes, atlas.layouts, strict=True))
+        uses, instance_mesh = separate_materials(packer.document, uses, placed, instance_mesh)
     assign_materials(packer.document, uses, add_ao_textures(packer, ao_png or {}))
     _write_version(packer.document)
     return GlbFile(packer.glb(), tuple(instance_mesh))
@@ -111,12 +122,15 @@ def _rewrite(
 ) -> tuple[Packer, list[BakedUse], list[int]]:
     """Return a copy of the source document with lightmap uv, its baked primitives and the instance meshes."""
     document = copy.deepcopy(source.json)
-    lit = {k for k, layout in enumerate(atlas.layouts) if layout.receives}
-    instance_mesh = _own_meshes(document, source.json, scene.instances, lit)
+    instance_mesh = own_meshes(document, source.json, scene.instances, atlas.layouts)
+    # Instances with the same mesh share its geometry, so write that of the first one.
+    first: dict[int, tuple[Instance, InstanceLayout]] = {}
+    for instance, layout, mesh_index in zip(scene.instances, atlas.layouts, instance_mesh, strict=True):
+        if layout.receives:
+            first.setdefault(mesh_index, (instance, layout))
     pieces = [
         piece
-        for instance, layout, mesh_index in zip(scene.instances, atlas.layouts, instance_mesh, strict=True)
-        if layout.receives
+        for mesh_index, (instance, layout) in first.items()
         for piece in _split(
             scene.meshes[instance.mesh],
             layout,
@@ -136,36 +150,9 @@ def _rewrite(
     uses = []
     for piece in pieces:
         moved = None if piece.kept else _rewrite_primitive(packer, source, piece, ao=ao)
-        uses.append(BakedUse(piece.primitive, piece.page, moved))
+        uses.append(BakedUse(piece.primitive, piece.page, moved, piece.shared))
     embed_images(packer, source)
     return packer, uses, instance_mesh
-
-
-def _own_meshes(document: Json, source: Json, instances: tuple[Instance, ...], lit: set[int]) -> list[int]:
-    """Assign a separate mesh to every node with a lightmap, and return the mesh index of each instance.
-
-    lit : indices of the instances with a lightmap
-
-    The first instance of a mesh keeps the mesh's index; for the other instances, copies of the mesh are
-    appended. If a node without a lightmap (for example in another scene) uses the mesh, all instances with a
-    lightmap get copies.
-    """
-    baked = {instance.node for k, instance in enumerate(instances) if k in lit}
-    if len({instance.node for instance in instances}) < len(instances):
-        raise InputError("a node stands for several instances; baking them apart is not possible")
-    taken = {
-        node["mesh"] for i, node in objects(source, "nodes") if i not in baked and is_index(node.get("mesh"))
-    }
-    result = []
-    for k, instance in enumerate(instances):
-        mesh = source["nodes"][instance.node]["mesh"]
-        if k in lit and mesh in taken:
-            document["meshes"].append(copy.deepcopy(source["meshes"][mesh]))
-            document["nodes"][instance.node]["mesh"] = len(document["meshes"]) - 1
-        if k in lit:
-            taken.add(mesh)
-        result.append(document["nodes"][instance.node]["mesh"])
-    return result
 
 
 def _split(mesh: Mesh, layout: InstanceLayout, output: list[Json], source: list[Json]) -> list[_Piece]:
@@ -173,12 +160,13 @@ def _split(mesh: Mesh, layout: InstanceLayout, output: list[Json], source: list[
     pieces = []
     for number in np.unique(mesh.primitive).tolist():
         used, corner = np.unique(layout.triangle[mesh.primitive == number], return_inverse=True)
-        vertex, uv = layout.vertex[used], layout.uv[used]
+        vertex, uv = layout.vertex[used], layout.texcoord_1[used]
         old = mesh.texcoord[1] if len(mesh.texcoord) > 1 else None
         has_old = "TEXCOORD_1" in source[number]["attributes"] and old is not None
         kept = has_old and old is not None and np.array_equal(old[vertex], uv)
         row, triangle = mesh.source_vertex[vertex], corner.reshape(-1, 3)
-        pieces.append(_Piece(output[number], source[number], layout.page, row, uv, triangle, kept))
+        primitives = (output[number], source[number])
+        pieces.append(_Piece(*primitives, layout.page, layout.shared, row, uv, triangle, kept))
     return pieces
 
 

@@ -27,7 +27,7 @@ def codes(atlas) -> list[str]:
 
 
 def test_density_is_exact_and_overflows_into_pages():
-    atlas = unwrap(boxes(40), resolution=256, density=32, padding=2)
+    atlas = unwrap(boxes(40), resolution=256, density=32, padding=2, instances="unique")
     assert codes(atlas) == []
     assert {layout.texels_per_metre for layout in atlas.layouts} == {32.0}
     # 40 boxes with 6 charts of (32 + 1 + 2)^2 texels need at least 4.5 pages of 256^2 texels.
@@ -86,9 +86,9 @@ def test_more_charts_than_all_pages_hold_are_refused():
 
 def test_the_page_is_filled():
     # The density is nearly the largest possible: with 4 % more, the boxes need two pages.
-    atlas = unwrap(boxes(30), resolution=256, padding=2)
+    atlas = unwrap(boxes(30), resolution=256, padding=2, instances="unique")
     density = atlas.layouts[0].texels_per_metre
-    more = unwrap(boxes(30), resolution=256, padding=2, density=density * 1.04)
+    more = unwrap(boxes(30), resolution=256, padding=2, density=density * 1.04, instances="unique")
     assert more.n_pages == 2
     # A row of 254 texels has 14 of the 180 charts, so a chart has 254 // 14 = 18 texels, 2 of them empty. The
     # first and the last of the other 16 texel centres are 15 texels apart.

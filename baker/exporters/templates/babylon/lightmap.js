@@ -16,7 +16,11 @@ export async function loadBake(BABYLON, folder, scene, options = {}) {
   const base = folder.endsWith('/') ? folder : folder + '/';
   if (fflate) BABYLON.ExrLoaderGlobalConfiguration.FFLATEUrl = fflate;
   const bake = await (await fetch(base + 'lightmap.json')).json();
+  // Instances of a mesh would share its material, but each node has its own place in the pages.
+  const activated = BABYLON.SceneLoader.OnPluginActivatedObservable;
+  const observer = activated.add((loader) => { if (loader.name === 'gltf') loader.createInstances = false; });
   const loaded = await BABYLON.SceneLoader.ImportMeshAsync('', base, bake.scene, scene);
+  activated.remove(observer);
   if (!lights) for (const light of loaded.lights) light.setEnabled(false);
   const byNode = new Map(bake.objects.map((object) => [object.node, object]));
   const meshes = loaded.meshes

@@ -33,12 +33,15 @@ def load(folder, exposure=1.0):
         uv = item.data.uv_layers[1].name
         if not item.data.materials:
             item.data.materials.append(bpy.data.materials.new("default"))
-        for slot in range(len(item.data.materials)):
-            material = item.data.materials[slot] or bpy.data.materials.new("default")
+        for slot in item.material_slots:
+            material = slot.material or bpy.data.materials.new("default")
             key = (material.name, entry["page"], *entry["uv_scale"], *entry["uv_offset"], uv)
             if key not in copies:
                 copies[key] = lit_material(material, images[entry["page"]], uv, entry, exposure)
-            item.data.materials[slot] = copies[key]
+            if item.data.users > 1:
+                # The objects of a mesh have different places in the pages, so the object has the material.
+                slot.link = "OBJECT"
+            slot.material = copies[key]
         lit.append(item)
     return lit
 

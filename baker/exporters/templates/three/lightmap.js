@@ -23,7 +23,10 @@ export async function loadBake(folder, options = {}) {
     new GLTFLoader().loadAsync(base + bake.scene),
     ...bake.pages.map((page) => loadPage(base, page, options)),
   ]);
-  applyLightmaps(gltf, bake, textures, { ...options, topDown: Boolean(options.ktx2 || options.webp) });
+  // Several nodes may have the same mesh and the same name. The parser returns the object of each node.
+  const parts = bake.objects.map(async (object) => [await gltf.parser.getDependency('node', object.node), object]);
+  const objects = new Map(await Promise.all(parts));
+  applyLightmaps(gltf, bake, textures, { ...options, objects, topDown: Boolean(options.ktx2 || options.webp) });
   return { gltf, bake, textures };
 }
 
@@ -42,9 +45,10 @@ async function loadRgbm(url, top) {
 }
 
 // Assigns light maps to the objects of a loaded glTF. Set the option `topDown` if the textures have the first row of
-// the files at v = 0, as those of KTX2Loader have. Textures of EXRLoader have the last row there.
+// the files at v = 0, as those of KTX2Loader have. Textures of EXRLoader have the last row there. The option `objects`
+// is a Map from nodes to entries of `bake.objects`.
 export function applyLightmaps(gltf, bake, textures, options = {}) {
-  const { exposure = 1, matte = true, lights = false, topDown = false } = options;
+  const { exposure = 1, matte = true, lights = false, topDown = false, objects } = options;
   const byNode = new Map(bake.objects.map((object) => [object.node, object]));
   const byName = uniqueNames(bake.objects);
   const placed = new Map();
@@ -52,7 +56,10 @@ export function applyLightmaps(gltf, bake, textures, options = {}) {
   const visit = (node, inherited) => {
     // GLTFLoader changes names (dots, blanks, repeated names), so identify nodes by index if possible.
     const index = gltf.parser.associations.get(node)?.nodes;
-    let object = index === undefined ? byName.get(node.userData.name ?? node.name) : byNode.get(index);
+    let object = objects?.get(node);
+    if (object === undefined && objects === undefined) {
+      object = index === undefined ? byName.get(node.userData.name ?? node.name) : byNode.get(index);
+    }
     // A mesh with several primitives becomes a group of meshes, which get the object of their node.
     if (object === undefined && index === undefined) object = inherited;
     if (node.isLight && !lights) node.visible = false;

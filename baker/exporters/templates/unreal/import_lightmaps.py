@@ -307,8 +307,11 @@ def fill_instance(instance, parent, entry, material, textures):
     ASSETS.save_loaded_asset(instance)
 
 
-def assign_materials(mesh, entry, folder, materials, textures, function):
-    """Give each slot of a mesh its instance. Slots have the names of the materials in the file."""
+def assign_materials(mesh, component, entry, folder, materials, textures, function):
+    """Give each slot of an actor's component its instance. Slots have the names of the materials in the file.
+
+    Objects with the same mesh have different places in the pages, so the mesh itself keeps its materials.
+    """
     for number, slot in enumerate(mesh.get_editor_property("static_materials")):
         name = str(slot.get_editor_property("material_slot_name"))
         if name not in entry["materials"] and number < len(entry["materials"]):
@@ -322,8 +325,7 @@ def assign_materials(mesh, entry, folder, materials, textures, function):
         )
         parent = make_parent(function, material["blend"], material["two_sided"])
         fill_instance(instance, parent, entry, material, textures)
-        mesh.set_material(number, instance)
-    ASSETS.save_loaded_asset(mesh)
+        component.set_material(number, instance)
 
 
 def placed_actors():
@@ -337,7 +339,7 @@ def placed_actors():
 
 
 def put_actor(mesh, entry, actor):
-    """Move the actor of an object to its place; create it if it is None."""
+    """Move the actor of an object to its place; create it if it is None; return its component."""
     location = unreal.Vector(*entry["location"])
     if actor is None:
         actors = unreal.get_editor_subsystem(unreal.EditorActorSubsystem)
@@ -345,12 +347,14 @@ def put_actor(mesh, entry, actor):
         actor.set_editor_property("tags", [TAG, entry["name"]])
         actor.set_actor_label(entry["name"])
         actor.set_folder_path("Baker")
-    actor.get_editor_property("static_mesh_component").set_static_mesh(mesh)
+    component = actor.get_editor_property("static_mesh_component")
+    component.set_static_mesh(mesh)
     rotation = unreal.Quat(*entry["rotation"]).rotator()
     scale = unreal.Vector(*entry["scale"])
     actor.set_actor_transform(unreal.Transform(location, rotation, scale), False, True)
     if entry["sheared"]:
         unreal.log_warning("Baker: {} is sheared, which actors cannot be.".format(entry["name"]))
+    return component
 
 
 def main():
@@ -370,13 +374,13 @@ def main():
     actors = placed_actors()
     done = 0
     for entry in bake["objects"]:
-        path = meshes.get(entry["name"])
+        path = meshes.get(entry["mesh"])
         mesh = ASSETS.load_asset(path) if path else None
         if not isinstance(mesh, unreal.StaticMesh):
-            unreal.log_warning("Baker: no static mesh is named {}.".format(entry["name"]))
+            unreal.log_warning("Baker: no static mesh is named {}.".format(entry["mesh"]))
             continue
-        assign_materials(mesh, entry, folder, materials, textures, function)
-        put_actor(mesh, entry, actors.pop(entry["name"], None))
+        component = put_actor(mesh, entry, actors.pop(entry["name"], None))
+        assign_materials(mesh, component, entry, folder, materials, textures, function)
         done += 1
     for actor in actors.values():
         unreal.get_editor_subsystem(unreal.EditorActorSubsystem).destroy_actor(actor)
