@@ -12,6 +12,26 @@ from baker.core.foreign_names import foreign_answer
 E = TypeVar("E", bound=BakerError)
 
 
+def nearest_name(name: str, known: Iterable[str]) -> str | None:
+    """Return the known name that is most similar to a name.
+
+    Parameters
+    ----------
+    name : str
+        The name. Case is ignored, and dashes count as underscores.
+    known : iterable of str
+        The known names.
+
+    Returns
+    -------
+    str or None
+        One of `known`, or None if none is similar.
+    """
+    folded = {_fold(other): other for other in known}
+    near = get_close_matches(_fold(name), folded, n=1)
+    return folded[near[0]] if near else None
+
+
 def unknown_name(
     what: str,
     name: str,
@@ -47,10 +67,9 @@ def unknown_name(
         The error; the caller raises it.
     """
     known = list(known)
-    folded = {_fold(other): other for other in known}
-    near = get_close_matches(_fold(name), folded, n=1)
+    near = nearest_name(name, known)
     names = listed or f"known are {', '.join(known)}"
-    hint = f"did you mean '{folded[near[0]]}'? ({names})" if near else names
+    hint = names if near is None else f"did you mean '{near}'? ({names})"
     return error(f"there is no {what} '{name}'; {hint}", file=file, object=object)
 
 

@@ -6,10 +6,10 @@ the root, such as `House/Floor 1/*`. A pattern that matches a node also matches 
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from typing import Any
 
+from baker.core.names import nearest_name
 from baker.core.printable import printable
 from baker.core.scene import Scene
 
@@ -65,10 +65,8 @@ class NodeNames:
 
     def nearest(self, pattern: str) -> str:
         """Return the words "; did you mean 'NAME'?" for a pattern that matches nothing, or an empty text."""
-        known = list(dict.fromkeys(text for texts in self._known.values() for text in texts))
-        near = get_close_matches(pattern.lower(), [text.lower() for text in known], n=1)
-        found = [text for text in known if text.lower() in near]
-        return f"; did you mean '{found[0]}'?" if found else ""
+        found = nearest_name(pattern, [text for texts in self._known.values() for text in texts])
+        return "" if found is None else f"; did you mean '{found}'?"
 
     def _texts(self, node: int, name: str) -> list[str]:
         """Return the names and paths of a node and its ancestors."""

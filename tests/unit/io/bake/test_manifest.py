@@ -40,8 +40,9 @@ def test_every_promised_key_is_there(tmp_path: Path) -> None:
     jsonschema.Draft202012Validator.check_schema(manifest_schema())
     manifest = bake(quad_result(tmp_path / "in"), tmp_path / "out")
     assert list(manifest) == [
-        "version", "settings", "versions", "input", "created", "channels", "pages", "instances", "lights",
-        "timings", "rays", "solve", "statistics", "suggested_exposure", "warnings", "denoise", "files",
+        "version", "settings", "versions", "input", "created", "channels", "pages", "instances", "objects",
+        "lights", "timings", "rays", "solve", "statistics", "suggested_exposure", "warnings", "denoise",
+        "files",
     ]  # fmt: skip
     assert {
         (p["channel"], p["page"], p["file"], p["width"], p["height"], p["unit"]) for p in manifest["pages"]
