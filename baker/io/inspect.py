@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from baker.core.encoding import encoding_of
 from baker.core.errors import InputError
@@ -182,15 +183,7 @@ def _image(path: Path, image: Any) -> dict[str, Any]:
 
 def _scene(path: Path, scene: Scene) -> dict[str, Any]:
     uses = Counter(instance.mesh for instance in scene.instances)
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    for instance in scene.instances:
-        matrix = instance.world_from_object
-        mesh = scene.meshes[instance.mesh]
-        is_used = np.zeros(len(mesh.position), dtype=bool)
-        is_used[mesh.triangle] = True
-        used = mesh.position[is_used].astype(np.float64)
-        world = used @ matrix[:3, :3].T + matrix[:3, 3]
-        low, high = np.minimum(low, world.min(axis=0)), np.maximum(high, world.max(axis=0))
+    low, high = _box(scene)
     return {
         "kind": "scene",
         "path": str(path),
@@ -241,3 +234,17 @@ def _scene(path: Path, scene: Scene) -> dict[str, Any]:
         ],
         "warnings": [{"code": w.code, "message": w.message, "object": w.object} for w in scene.warnings],
     }
+
+
+def _box(scene: Scene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the lowest and the highest world position of the used vertices, (3,) float64 each."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for instance in scene.instances:
+        matrix = instance.world_from_object
+        mesh = scene.meshes[instance.mesh]
+        is_used = np.zeros(len(mesh.position), dtype=bool)
+        is_used[mesh.triangle] = True
+        used = mesh.position[is_used].astype(np.float64)
+        world = used @ matrix[:3, :3].T + matrix[:3, 3]
+        low, high = np.minimum(low, world.min(axis=0)), np.maximum(high, world.max(axis=0))
+    return low, high
