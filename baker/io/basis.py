@@ -7,15 +7,12 @@ import struct
 import numpy as np
 from numpy.typing import NDArray
 
-# First bytes of a KTX2 file.
-KTX2_HEAD = b"\xabKTX 20\xbb\r\n\x1a\n"
-
 
 class BasisError(Exception):
     """A texture cannot be decoded; the text of the error says why and what to do."""
 
 
-def ktx2_size(data: bytes) -> tuple[int, int]:
+def basis_size(data: bytes) -> tuple[int, int]:
     """Return the width and height that the header of a KTX2 file states, texels.
 
     Parameters

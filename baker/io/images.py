@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from baker.core.budget import LARGEST_IMAGE_SIDE
 from baker.core.colour import linear_from_srgb
 from baker.core.errors import InputError
-from baker.io.basis import KTX2_HEAD, BasisError, decode_basis, ktx2_size
+from baker.io.basis import BasisError, basis_size, decode_basis
+from baker.io.ktx2 import KTX2_IDENTIFIER
 from baker.io.png import srgb_levels
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def decode_image(data: bytes, *, file: str, object: str) -> NDArray[np.uint8]:
     InputError
         If the data is not an image that can be decoded, or if its width or height exceeds 16384 texels.
     """
-    if data.startswith(KTX2_HEAD):
+    if data.startswith(KTX2_IDENTIFIER):
         return _decode_ktx2(data, file, object)
     import PIL.Image
 
@@ -128,7 +129,7 @@ def _decode_ktx2(data: bytes, file: str, object: str) -> NDArray[np.uint8]:
     import PIL.Image
 
     try:
-        _check_size(*ktx2_size(data), file, object)
+        _check_size(*basis_size(data), file, object)
         pixels = decode_basis(data)
     except BasisError as error:
         raise InputError(str(error), file=file, object=object) from None

@@ -27,7 +27,8 @@ from baker.io.regular_file import read_regular
 
 # VK_FORMAT_E5B9G9R9_UFLOAT_PACK32.
 _FORMAT = 123
-_IDENTIFIER = b"\xabKTX 20\xbb\r\n\x1a\n"
+# First bytes of a file.
+KTX2_IDENTIFIER = b"\xabKTX 20\xbb\r\n\x1a\n"
 # Identifier; format, bytes of a word, width, height, depth, layers, faces, mip levels, compression; offset
 # and size of the data format descriptor, of the texts and of global data of the compression.
 _HEAD = struct.Struct("<12s9I4I2Q")
@@ -65,7 +66,7 @@ def encode_ktx2(code: NDArray[np.uint32], text: Mapping[str, str], writer: str) 
     # Orientation "rd": columns go to the right, rows go down.
     texts = _key_values({**text, "KTXorientation": "rd", "KTXwriter": writer})
     counts = (_FORMAT, 4, width, height, 0, 0, 1, 1, _ZSTANDARD)
-    head = _HEAD.pack(_IDENTIFIER, *counts, format_at, len(described), text_at, len(texts), 0, 0)
+    head = _HEAD.pack(KTX2_IDENTIFIER, *counts, format_at, len(described), text_at, len(texts), 0, 0)
     level = _LEVEL.pack(text_at + len(texts), len(packed), len(raw))
     return b"".join((head, level, described, texts, packed))
 
@@ -130,7 +131,7 @@ def _readable(path: Path) -> Iterator[None]:
 
 
 def _head(data: bytes) -> tuple[Any, ...]:
-    if not data.startswith(_IDENTIFIER):
+    if not data.startswith(KTX2_IDENTIFIER):
         raise ValueError("no KTX2 identifier")
     return _HEAD.unpack_from(data)
 

@@ -70,11 +70,11 @@ def _replace(document: GltfDocument, view: JsonObject, name: str, decoded: Decod
     assert extension is not None
     fallback = _has_fallback(document, view)
     try:
-        number = extension.index("buffer", len(document.buffers), "buffers")
-        source, offset = _source(document, extension, number)
+        number, offset, length = document.span(extension)
+        source = np.frombuffer(document.buffers[number], np.uint8, length, offset)
         if not fallback:
             decoded.append(view.value, _decode(view, extension, source, decoded))
-        decoded.drop(number, offset, len(source))
+        decoded.drop(number, offset, length)
     except InputError:
         if not fallback:
             raise
@@ -99,17 +99,6 @@ def _decode(
         return decode_stream(source, layout)
     except StreamError as error:
         extension.fail(f"{error}; export the file again")
-
-
-def _source(document: GltfDocument, extension: JsonObject, number: int) -> tuple[NDArray[np.uint8], int]:
-    """Return the compressed bytes of a view, (N,) uint8, and their offset in the buffer."""
-    if number in document.buffer_faults:
-        raise document.buffer_faults[number]
-    buffer = document.buffers[number]
-    offset, length = extension.integer("byteOffset", 0), extension.integer("byteLength", minimum=1)
-    if offset + length > len(buffer):
-        extension.fail(f"bytes {offset} to {offset + length} lie outside its buffer of {len(buffer)} bytes")
-    return np.frombuffer(buffer, np.uint8, length, offset), offset
 
 
 def _check_size(view: JsonObject, extension: JsonObject, layout: Layout, decoded: DecodedData) -> None:

@@ -71,14 +71,30 @@ class GltfDocument:
         view = self.root.children("bufferViews")[index]
         if view.where in self.data_faults:
             raise self.data_faults[view.where]
-        number = view.index("buffer", len(self.buffers), "buffers")
+        number, offset, length = self.span(view)
+        return self.buffers[number], offset, length, view.integer("byteStride", 0)
+
+    def span(self, part: JsonObject) -> tuple[int, int, int]:
+        """Return (buffer index, byte offset, byte length) of a JSON object with these members.
+
+        Parameters
+        ----------
+        part : JsonObject
+            A buffer view, or the extension of a compressed one.
+
+        Raises
+        ------
+        InputError
+            If the bytes exceed the buffer, or the buffer cannot be read.
+        """
+        number = part.index("buffer", len(self.buffers), "buffers")
         if number in self.buffer_faults:
             raise self.buffer_faults[number]
-        data = self.buffers[number]
-        offset, length = view.integer("byteOffset", 0), view.integer("byteLength", minimum=1)
-        if offset + length > len(data):
-            view.fail(f"bytes {offset} to {offset + length} lie outside its buffer of {len(data)} bytes")
-        return data, offset, length, view.integer("byteStride", 0)
+        size = len(self.buffers[number])
+        offset, length = part.integer("byteOffset", 0), part.integer("byteLength", minimum=1)
+        if offset + length > size:
+            part.fail(f"bytes {offset} to {offset + length} lie outside its buffer of {size} bytes")
+        return number, offset, length
 
 
 def open_document(path: Path, data: bytes, folder: SceneFolder | None = None) -> GltfDocument:
